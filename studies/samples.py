@@ -37,14 +37,3 @@ def auc(positive: np.ndarray, negative: np.ndarray) -> float:
     ranks = stats.rankdata(np.concatenate([positive, negative]))
     wins = ranks[: len(positive)].sum() - 0.5 * len(positive) * (len(positive) + 1)
     return float(wins / (len(positive) * len(negative)))
-
-
-def share_interval(hits: int, count: int) -> list[float]:
-    """Return the 95 % interval of a share (Wilson 1927)."""
-    if not count:
-        return [0.0, 1.0]
-    z, share = 1.96, hits / count
-    middle = share + z * z / (2.0 * count)
-    half = z * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count))
-    scale = 1.0 + z * z / count
-    return [max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)]

@@ -11,12 +11,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE
 
 COLOURS = {
     'estimator': BLUE,
     'no rejection': GREEN,
-    'plain filter': VERMILION,
     'invariant': PURPLE,
     'invariant, χ²': SKY,
     'odometry': ORANGE,

@@ -18,7 +18,7 @@ from studies.sensing import rivals
 from studies.sensing.walks import Course, Log
 
 METHODS = (
-    *('estimator', 'no rejection', 'plain filter', 'invariant', 'invariant, χ²'),
+    *('estimator', 'no rejection', 'invariant', 'invariant, χ²'),
     *('odometry', 'odometry, r = 0'),
 )
 

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rivals of the body estimator: a plain and an invariant filter, and legged odometry."""
+"""Rivals of the body estimator: an invariant filter, and legged odometry."""
 
 from __future__ import annotations
 
-import abc
 import functools
 import math
 from collections.abc import Callable
@@ -19,8 +18,6 @@ from studies.sensing.walks import Course, Log
 
 Rows = list[tuple[Any, ...]]
 GATE = 11.3  # 99 % of χ² with 3 degrees of freedom
-CALM, SLOW = 0.03, 2.5  # s, and standard deviations of the speed, until a foot sticks again
-SLIDING = 0.4  # m/s, noise of a foothold that slips
 GYRO_BIAS = 5e-4  # rad/s, deviation of the mean of a second at rest
 LOAD = 0.1  # of the expected load, from which on a foot stands
 
@@ -68,157 +65,7 @@ def odometry(robot: Robot, log: Log, course: Course, radius: float) -> Rows:
     return rows
 
 
-class _Filter(abc.ABC):
-    """What both filters have: state, start from the readings at rest, rolling, rows.
-
-    Errors of rotation, velocity and position are the first nine of the covariance.
-    """
-
-    shakes = 0.3  # m/s², change of the acceleration between two samples
-    stray = 0.01  # m after 1 s, random motion of a foothold; with less it is lost on some walks
-
-    def __init__(self, robot: Robot, course: Course) -> None:
-        self._robot, self._dt = robot, 1.0 / course.rate
-        self._noise = course.noise
-        legs = len(robot.legs)
-        self._to_imu: Array = np.asarray(np.linalg.inv(robot.imu), dtype=float)
-        self.turn, self.velocity, self.position = np.eye(3), np.zeros(3), np.zeros(3)
-        self.biases, self.feet = np.zeros((2, 3)), np.zeros((legs, 3))
-        self.covariance = np.zeros((15 + 3 * legs, 15 + 3 * legs))
-        self._stands = np.zeros(legs, dtype=bool)
-
-    def begin(self, log: Log) -> None:
-        """Take tilt and bias of the gyro from the readings at rest."""
-        still = slice(0, round(1.0 / self._dt))
-        up = log.accelerometer[still].mean(0)
-        axis = cross(up / np.linalg.norm(up), np.array((0.0, 0.0, 1.0)))
-        self.turn = rotation(axis)
-        self.biases[0] = log.gyro[still].mean(0)
-
-    @abc.abstractmethod
-    def update(self, gyro: Array, force: Array, q: Array, dq: Array, stands: Flags) -> Array:
-        """Process a sample; return the slip velocities of the feet, (legs, 3), m/s."""
-
-    def _rolling(self, feet: _Feet, rate: Array) -> Array:
-        radius = self._robot.foot_radius
-        return feet.slips(self.turn, rate, 0.0) - feet.slips(self.turn, rate, radius)
-
-    def _deviation(self) -> Array:
-        return np.asarray(np.sqrt(np.diag(self.covariance)[3:5]))
-
-    def rows(self, log: Log) -> Rows:
-        """Return position, velocity and its deviation, of the base, and the slips."""
-        self.begin(log)
-        arm = self._to_imu[:3, 3]
-        rows: Rows = []
-        for gyro, force, q, dq, stands in zip(
-            *(log.gyro, log.accelerometer, log.joint_positions, log.joint_velocities),
-            loads_of(self._robot, log),
-            strict=True,
-        ):
-            slips = self.update(gyro, force, q, dq, stands)
-            velocity = self.velocity + self.turn @ cross(gyro - self.biases[0], arm)
-            rows.append((self.position + self.turn @ arm, velocity, slips, self._deviation()))
-        return rows
-
-
-class PlainFilter(_Filter):
-    """Error-state filter of 15 + 3 legs states, feet taken one by one.
-
-    Rotation, velocity, position, biases and footholds, with errors in odom axes (Bloesch 2012);
-    a foot whose innovation is above 99 % of its χ² is taken to slip: then only its height counts,
-    until its speed was low for 30 ms.
-    """
-
-    def __init__(self, robot: Robot, course: Course) -> None:
-        super().__init__(robot, course)
-        deviations = [0.01, 0.01, 0.0, *[0.02] * 3, *[0.0] * 3, *[GYRO_BIAS] * 3]
-        deviations += [course.noise.accelerometer_bias] * 3 + [0.0] * self.feet.size
-        self.covariance = np.diag(np.square(deviations))
-        self._slow = np.full(len(self.feet), math.inf)  # time for which each foot was slow, s
-
-    def update(self, gyro: Array, force: Array, q: Array, dq: Array, stands: Flags) -> Array:
-        """Process a sample; return the slip velocities of the feet, (legs, 3), m/s."""
-        feet = _Feet(self._robot, self._to_imu, q, dq)
-        rate = gyro - self.biases[0]
-        self._predict(rate, force - self.biases[1], self._rolling(feet, rate))
-        for leg in np.flatnonzero(stands & ~self._stands).tolist():
-            self._set_down(leg, feet)
-        self._stands = stands
-        scores = {leg: self._score(leg, feet)[2] for leg in np.flatnonzero(stands).tolist()}
-        for leg in sorted(scores, key=scores.__getitem__):
-            self._correct(leg, feet)
-        slips = self.velocity + feet.slips(self.turn, rate, self._robot.foot_radius)
-        speed = np.sqrt(0.5 * (self.covariance[3, 3] + self.covariance[4, 4]) + 0.01**2)
-        slow = np.linalg.norm(slips[:, :2], axis=1) < SLOW * speed
-        self._slow = np.where(slow, self._slow + self._dt, 0.0 * self._slow.clip(0.0, 1.0))
-        return slips
-
-    def _predict(self, rate: Array, force: Array, rolling: Array) -> None:
-        dt, turn = self._dt, self.turn
-        acceleration = turn @ force
-        size = len(self.covariance)
-        step, noise = np.eye(size), np.zeros(size)
-        step[0:3, 9:12] = -dt * turn
-        step[3:6, 0:3] = -dt * skew(acceleration)
-        step[3:6, 12:15] = -dt * turn
-        step[6:9, 3:6] = dt * np.eye(3)
-        self.position = self.position + dt * (self.velocity + 0.5 * dt * (acceleration + GRAVITY))
-        self.velocity = self.velocity + dt * (acceleration + GRAVITY)
-        self.turn = turn @ rotation(rate * dt)
-        self.feet += dt * rolling
-        noise[0:3] = (dt * self._noise.gyro) ** 2
-        noise[3:6] = (dt * math.hypot(self._noise.accelerometer, self.shakes)) ** 2
-        slides = self._slow < CALM
-        strays = np.tile(self.stray**2 * dt, (len(slides), 3))
-        strays[slides, :2] = SLIDING**2 * dt * 0.05
-        noise[15:] = strays.ravel()
-        self.covariance = step @ self.covariance @ step.T + np.diag(noise)
-
-    def _set_down(self, leg: int, feet: _Feet) -> None:
-        arm = self.turn @ feet.places[leg]
-        self.feet[leg] = self.position + arm
-        at = slice(15 + 3 * leg, 18 + 3 * leg)
-        line = np.zeros((3, len(self.covariance)))
-        line[:, 0:3], line[:, 6:9] = -skew(arm), np.eye(3)
-        self.covariance[at] = line @ self.covariance
-        self.covariance[:, at] = self.covariance[at].T
-        self.covariance[at, at] = line @ self.covariance @ line.T + self._spread(leg, feet)
-        self._slow[leg] = math.inf
-
-    def _spread(self, leg: int, feet: _Feet) -> Array:
-        arm = self.turn @ feet.jacobians[leg]
-        return np.asarray(self._noise.encoder**2 * arm @ arm.T + 3e-4**2 * np.eye(3))
-
-    def _score(self, leg: int, feet: _Feet) -> tuple[Array, Array, float, Array]:
-        arm = self.turn @ feet.places[leg]
-        line = np.zeros((3, len(self.covariance)))
-        line[:, 0:3], line[:, 6:9] = skew(arm), -np.eye(3)
-        line[:, 15 + 3 * leg : 18 + 3 * leg] = np.eye(3)
-        miss = arm - (self.feet[leg] - self.position)
-        spread = line @ self.covariance @ line.T + self._spread(leg, feet)
-        return line, miss, float(miss @ np.linalg.solve(spread, miss)), spread
-
-    def _correct(self, leg: int, feet: _Feet) -> None:
-        line, miss, score, spread = self._score(leg, feet)
-        if score > GATE:
-            self._slow[leg] = 0.0
-            at = 15 + 3 * leg
-            self.covariance[at, at] += 0.02**2
-            self.covariance[at + 1, at + 1] += 0.02**2
-            line, miss, _, spread = self._score(leg, feet)
-        gain = np.linalg.solve(spread, line @ self.covariance).T
-        error = gain @ miss
-        self.covariance -= gain @ line @ self.covariance
-        self.covariance = 0.5 * (self.covariance + self.covariance.T)
-        self.turn = rotation(error[0:3]) @ self.turn
-        self.velocity = self.velocity + error[3:6]
-        self.position = self.position + error[6:9]
-        self.biases += error[9:15].reshape(2, 3)
-        self.feet += error[15:].reshape(-1, 3)
-
-
-class InvariantFilter(_Filter):
+class InvariantFilter:
     """Right-invariant filter of contacts (Hartley 2020), biases appended.
 
     Rotation, velocity, position and footholds are one element X of a group, with the error
@@ -232,11 +79,25 @@ class InvariantFilter(_Filter):
     shakes, stray = 0.1, 0.002  # chosen on seed 1
 
     def __init__(self, robot: Robot, course: Course, gate: float = math.inf) -> None:
-        super().__init__(robot, course)
+        self._robot, self._dt = robot, 1.0 / course.rate
+        self._noise = course.noise
+        legs = len(robot.legs)
+        self._to_imu: Array = np.asarray(np.linalg.inv(robot.imu), dtype=float)
+        self.turn, self.velocity, self.position = np.eye(3), np.zeros(3), np.zeros(3)
+        self.biases, self.feet = np.zeros((2, 3)), np.zeros((legs, 3))
+        self._stands = np.zeros(legs, dtype=bool)
         self._gate = gate
         deviations = [0.01, 0.01, 0.0, *[0.02] * 3, *[0.0] * 3, *[0.0] * self.feet.size]
         deviations += [GYRO_BIAS] * 3 + [course.noise.accelerometer_bias] * 3
         self.covariance = np.diag(np.square(deviations))
+
+    def begin(self, log: Log) -> None:
+        """Take tilt and bias of the gyro from the readings at rest."""
+        still = slice(0, round(1.0 / self._dt))
+        up = log.accelerometer[still].mean(0)
+        axis = cross(up / np.linalg.norm(up), np.array((0.0, 0.0, 1.0)))
+        self.turn = rotation(axis)
+        self.biases[0] = log.gyro[still].mean(0)
 
     def update(self, gyro: Array, force: Array, q: Array, dq: Array, stands: Flags) -> Array:
         """Process a sample; return the slip velocities of the feet, (legs, 3), m/s."""
@@ -247,6 +108,10 @@ class InvariantFilter(_Filter):
         self._stands = stands
         self._correct(feet, stands)
         return self.velocity + feet.slips(self.turn, rate, self._robot.foot_radius)
+
+    def _rolling(self, feet: _Feet, rate: Array) -> Array:
+        radius = self._robot.foot_radius
+        return feet.slips(self.turn, rate, 0.0) - feet.slips(self.turn, rate, radius)
 
     def predict(self, rate: Array, force: Array, rolling: Array) -> Array:
         """Advance by a sample; return what it does to an error, (size, size)."""
@@ -321,9 +186,23 @@ class InvariantFilter(_Filter):
         line = np.concatenate([-skew(self.velocity), np.eye(3)], axis=1)
         return np.asarray(np.sqrt(np.diag(line @ self.covariance[:6, :6] @ line.T)[:2]))
 
+    def rows(self, log: Log) -> Rows:
+        """Return position, velocity and its deviation, of the base, and the slips."""
+        self.begin(log)
+        arm = self._to_imu[:3, 3]
+        rows: Rows = []
+        for gyro, force, q, dq, stands in zip(
+            *(log.gyro, log.accelerometer, log.joint_positions, log.joint_velocities),
+            loads_of(self._robot, log),
+            strict=True,
+        ):
+            slips = self.update(gyro, force, q, dq, stands)
+            velocity = self.velocity + self.turn @ cross(gyro - self.biases[0], arm)
+            rows.append((self.position + self.turn @ arm, velocity, slips, self._deviation()))
+        return rows
 
-FILTERS: dict[str, Callable[[Robot, Course], _Filter]] = {
-    'plain filter': PlainFilter,
+
+FILTERS: dict[str, Callable[[Robot, Course], InvariantFilter]] = {
     'invariant': InvariantFilter,
     'invariant, χ²': functools.partial(InvariantFilter, gate=GATE),
 }

@@ -186,42 +186,6 @@ def _costs(panel: Axes, rows: Sequence[Row]) -> None:
     panel.grid(axis='y', color=PALE, alpha=0.25, lw=0.5)
 
 
-def walks(rows: Sequence[Row]) -> str:
-    """Return a table of noise, right and wrong, with intervals over walks: for the docs."""
-    rows = [row for row in rows if row.part == 'walks']
-    robots = [name for name in dict.fromkeys(row.name for row in rows) if name != 'sticks']
-    heads = [
-        f'{name}: slips missed, % | those that displaced the foot, % | μ within 2σ, %'
-        for name in robots
-    ]
-    lines = [
-        f'| noise | floors | {" | ".join(heads)} | false alarms a minute |',
-        '|---' * (3 * len(robots) + 3) + '|',
-    ]
-    for note, part in dict.fromkeys((row.note, row.variant) for row in rows):
-        mine = {row.name: row for row in rows if (row.note, row.variant) == (note, part)}
-        cells = []
-        for name in robots:
-            row = mine[name]
-            cells.append(f'{_with_ends(row, "misses", 1e2)} of {row.slips}')
-            cells.append(f'{_with_ends(row, "displaced_misses", 1e2)} of {row.displaced}')
-            cells.append(_with_ends(row, 'coverage', 1e2))
-        if 'sticks' in mine:
-            row = mine['sticks']
-            alarms = f'{_with_ends(row, "false_per_minute", 1.0)} in {row.stick_minutes:.1f} min'
-            cells.append(alarms)
-        lines.append(f'| {note} | {part} | {" | ".join(cells)} |')
-    return '\n'.join(lines)
-
-
-def _with_ends(row: Row, name: str, scale: float) -> str:
-    value = getattr(row, name)
-    if value is None:
-        return '-'
-    ends = [f'{scale * end:.3g}' for end in row.intervals.get(name, ())]
-    return f'{scale * value:.3g}' + (f' ({" to ".join(ends)})' if ends else '')
-
-
 # --- robustness ----------------------------------------------------------------------------------
 
 # Changes: name in the table and on the axis, and scale.
@@ -263,73 +227,6 @@ _DRAWN = (
     ('shear stiffness', 'false_per_minute'),
     ('position late', 'false_per_minute'),
 )
-_RULE = (
-    'Bold: more than {misses:g} % of slips missed, more than {false:g} false alarm a minute, wet'
-    ' or dry right at the end of less than {right:g} % of flat stances, the true friction within'
-    ' 2σ less than {within:g} % of the time, or the true margin below its 5 % quantile in more'
-    ' than 5 % of the time. Italic: as shipped.'
-)
-
-
-def robustness(rows: Sequence[Row]) -> str:
-    """Return a table of every change, bold where it breaks a target: for the docs."""
-    rows = [row for row in rows if row.part == 'robustness']
-    heads = ['changed', 'to', *(label for label, *_ in _MEASURES.values())]
-    lines = [f'| {" | ".join(heads)} |', '|---' * len(heads) + '|']
-    for change, (label, scale) in _CHANGES.items():
-        for variant in dict.fromkeys(row.variant for row in rows if row.name == change):
-            mine = [row for row in rows if (row.name, row.variant) == (change, variant)]
-            sizes = [f'{scale * row.value:g}' for row in mine]
-            to = [
-                f'*{size}*' if row.shipped else size for size, row in zip(sizes, mine, strict=True)
-            ]
-            cells = [_one_or_each([_cell(row, name) for row in mine]) for name in _MEASURES]
-            name = f'{label}; {variant}' if variant else label
-            lines.append(f'| {name} | {", ".join(to)} | {" | ".join(cells)} |')
-    rule = _RULE.format(
-        misses=1e2 * TARGETS['misses'],
-        false=TARGETS['false_per_minute'],
-        right=1e2 * TARGETS['wet_right'],
-        within=1e2 * TARGETS['coverage'][0],
-    )
-    return '\n'.join([*lines, '', rule, _remarks(rows)])
-
-
-def _cell(row: Row, name: str) -> str:
-    _, scale, low, high = _MEASURES[name]
-    value = getattr(row, name)
-    if value is None:
-        return '–'
-    text = f'{scale * value:.3g}'
-    return text if low <= value <= high else f'**{text}**'
-
-
-def _one_or_each(cells: Sequence[str]) -> str:
-    return cells[0] if len(set(cells)) == 1 else ', '.join(cells)
-
-
-def _remarks(rows: Sequence[Row]) -> str:
-    """Return sizes of the samples, how often 2σ is too wide, and where axes were in doubt."""
-    highest = TARGETS['coverage'][1]
-    wide = sum((row.coverage or 0.0) > highest for row in rows)
-    doubts = [
-        f'{row.name} {row.value:g} {row.unit} ({1e2 * row.axes:.0f} % of the time)'
-        for row in rows
-        if row.axes
-    ]
-    spans = [
-        (min(each), max(each))
-        for each in zip(
-            *((row.slips, row.stances, row.stick_minutes) for row in rows), strict=True
-        )
-    ]
-    (few, many), (least, most), (short, long) = spans
-    return (
-        f'Each value: {few} to {many} slips, {least} to {most} stances, {short:.1f} to {long:.1f}'
-        f' minutes of stick. In {wide} of {len(rows)} cases friction is within 2σ more often than'
-        f' the {1e2 * highest:g} % that are wanted at most: intervals are too wide there. Axes in'
-        f' doubt: {"; ".join(doubts) or "never"}.'
-    )
 
 
 def draw_robustness(rows: Sequence[Row]) -> Figure:

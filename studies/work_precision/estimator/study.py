@@ -63,12 +63,6 @@ def _stress(place: int, count: int | None) -> list[Row]:
     return conditions.stress(conditions.CHANGES[place], count)
 
 
-def tables(document: dict[str, Any]) -> dict[str, str]:
-    """Return the tables that are printed, by their names."""
-    rows = [Row(**row) for row in document['rows']]
-    return {'walks': chart.walks(rows), 'robustness': chart.robustness(rows)}
-
-
 def main(words: Sequence[str]) -> int:
     """Measure, print, save and draw."""
     part = command.parser('estimator', __doc__)
@@ -83,7 +77,7 @@ def main(words: Sequence[str]) -> int:
     folder = command.CHARTS if options.docs else options.out or new_folder(None, 'chart_estimator')
     rows = [Row(**row) for row in document['rows']]
     kept = command.write(folder, 'estimator', document, figures(rows))
-    command.show(options, kept, '\n\n'.join((table(rows), *tables(kept).values())))
+    command.show(options, kept, table(rows))
     return 0
 
 

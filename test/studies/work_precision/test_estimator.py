@@ -2,7 +2,6 @@
 import importlib.util
 import json
 import math
-import pathlib
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -344,11 +343,6 @@ def test_walks_have_a_row_of_the_table(rows):
     for row in found:
         for name, (low, high) in row.intervals.items():
             assert low <= getattr(row, name) <= high, name
-    lines = chart.walks(found).splitlines()
-    assert [line.split(' | ')[1] for line in lines[2:]] == ['tuned on', 'held out']
-    hexapod, sticks = found[:2]
-    assert f'of {hexapod.slips} |' in lines[2] and hexapod.slips > hexapod.displaced > 0
-    assert f'in {sticks.stick_minutes:.1f} min' in lines[2] and sticks.slips == 0
 
 
 def test_noise_is_changed_and_configured(plain):
@@ -378,24 +372,6 @@ def test_intervals_are_those_of_walks_drawn_anew():
     assert 'coverage' not in row.intervals
 
 
-def test_targets_that_a_change_breaks_are_bold():
-    cases = [
-        replace(
-            BLANK, part='robustness', name='position late', unit='s', value=value, misses=misses,
-            wet_right=0.97, false_per_minute=1.0, coverage=coverage, slips=slips, stances=20,
-            stick_minutes=2.0, shipped=not value,
-        )
-        for value, misses, coverage, slips in ((0.0, 0.01, 0.9, 100), (0.04, 0.0101, 0.899, 99))
-    ]  # fmt: skip
-    table = chart.robustness(cases)
-    assert '| position late by, ms | *0*, 40 | 1, **1.01** | 1 | 97 | 90, **89.9** | – |' in table
-    assert 'Each value: 99 to 100 slips, 20 to 20 stances, 2.0 to 2.0 minutes' in table
-    assert 'In 0 of 2 cases' in table and 'Axes in doubt: never.' in table
-    doubted = chart.robustness([replace(cases[1], axes=0.2, coverage=0.995)])
-    assert 'Axes in doubt: position late 0.04 s (20 % of the time).' in doubted
-    assert 'In 1 of 1 cases' in doubted
-
-
 def test_intervals_of_counts():
     """Of 0 in 20 and 8 in 20 by Clopper and Pearson; of 0 and 10 by the table of Garwood, 1936."""
     none = replace(BLANK, misses=0.0, wet_right=0.4, slips=20, stances=20)
@@ -417,15 +393,6 @@ def test_table_and_pictures(rows, tmp_path):
     for name, figure in pictures.items():
         figure.savefig(tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 20_000
-
-
-def test_the_picture_of_the_docs_shows_what_breaks_a_target():
-    docs = pathlib.Path(__file__).resolve().parents[3] / 'docs'
-    document = json.loads((docs / 'charts' / 'estimator.json').read_text())
-    rows = [tally.Row(**row) for row in document['rows']]
-    for change, measure in chart._DRAWN:
-        mine = [row for row in rows if (row.part, row.name) == ('robustness', change)]
-        assert any('**' in chart._cell(row, measure) for row in mine), change
 
 
 # --- pictures and tables ------------------------------------------------------------------------
