@@ -13,9 +13,8 @@ from matplotlib.figure import Figure
 
 from ros_pad.contact.calibrate import Calibration, Constant
 from ros_pad.contact.dome import BURST, inflate
-from ros_pad.contact.laws import with_constant
-from ros_pad.contact.pad import Array, Pad
-from ros_pad.reports.style import BLACK, BLUE, PALE, STYLE, VERMILION
+from ros_pad.contact.pad import Array, Pad, with_constant
+from ros_pad.reports.style import BLUE, PALE, STYLE, VERMILION
 
 _SHAPE = ('height', 'depth', 'contact_radius', 'gap')
 _MARKS = {'height': 'o', 'depth': 'v', 'contact_radius': 's', 'gap': '^'}
@@ -65,13 +64,6 @@ def _shape(calibration: Calibration, above: Axes, below: Axes) -> None:
             lw=0,
             label='its 95 % interval',
         )
-    if 'tension_at_rest' in known:
-        rest, rise = known['tension_at_rest'].value, known['tension_stiffness'].value
-        x = np.linspace(1e-3, 1.1 * float(free.height.max()) / pad.radius, 300)
-        # Laplace: p = 2 T/R.
-        law = 4.0 * (rest + rise * (np.sqrt(1.0 + x * x) - 1.0)) * x / (pad.radius * (1.0 + x * x))
-        label = f'two constants, {rest:.3g} and {rise:.3g} N/m'
-        above.plot(law / 1e3, 1e3 * x * pad.radius, color=BLACK, lw=1, ls='--', label=label)
     above.plot(free.pressure / 1e3, 1e3 * free.height, 'o', color=VERMILION, label='measured')
     above.set(xlabel='gauge pressure, kPa', ylabel='height of the free dome, mm', title='shape')
     above.set(xlim=(0.0, None), ylim=(0.0, None))
