@@ -14,14 +14,16 @@ import dataclasses
 import functools
 import math
 import pathlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ros_pad.configuration import choice, number
 from ros_pad.contact.dome import BURST, inflate, largest_tension, press
 from ros_pad.contact.film import WATER_VISCOSITY, Film
+from ros_pad.contact.fits import Constant, Fit, fit_positive, kept_constant, line_through
 from ros_pad.contact.foot_file import FITTED, UNITS, foot_text
 from ros_pad.contact.hyperelastic import pressure_end, pressure_for_height
 from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, force_limit, largest_pressure
@@ -31,13 +33,8 @@ from ros_pad.contact.pad import Array, MeasuredLimit, Pad, with_constant
 from ros_pad.contact.resistance import FOOT_SETTINGS, LIMIT_SETTINGS, PAD_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
-CONFIDENCE = 0.95
 FITS = ('factor', 'thickness')
 """What the shapes of domes of a material can be fitted by."""
-# A constant is identified if its interval is within this factor of its value, and if every change
-# of the constants by 1 % changes the modelled data by more than one part in 10^5.
-_WIDEST = 10.0
-_LEAST_EFFECT = 1e-3
 # Share by which single points may differ in stiffness before a warning says so.
 _TREND = 0.1
 
@@ -57,36 +54,6 @@ _IN_FOOT = {
     'force_limit': LIMIT_SETTINGS[0],
     'force_limit_slope': LIMIT_SETTINGS[2],
 }
-
-
-@dataclass(frozen=True)
-class Constant:
-    """One constant after a calibration.
-
-    Attributes
-    ----------
-    name, unit : str
-        Name and unit of the constant.
-    value : float
-        Value in this unit.
-    low, high : float
-        95 % interval; NaN where there are no more points than constants, or nothing was fitted.
-    points : int
-        Number of measurements used for the fit.
-    fitted : bool
-        True if fitted, False if kept from the start foot.
-    note : str
-        Purpose of the constant, or the reason why it was kept.
-    """
-
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-    points: int
-    fitted: bool
-    note: str
 
 
 @dataclass(frozen=True)
@@ -203,7 +170,7 @@ def calibrate(
     pad = _limit(measurements, pad, constants, warnings)
     limit = _criterion(foot, pad, warnings)
     ceiling = _ceiling(foot.ceiling, pad, limit, warnings)
-    foot = _with(foot, pad=pad, limit=limit, ceiling=ceiling)
+    foot = dataclasses.replace(foot, pad=pad, limit=limit, ceiling=ceiling)
     wet_floor = _WetFloor(film_thickness, viscosity)
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
     _check_constants(measurements.source, fit, constants)
@@ -282,10 +249,6 @@ def _fits_a_foot(source: str, constant: Constant) -> None:
         )
 
 
-def _with(foot: Foot, **changes: float | str | Pad) -> Foot:
-    return dataclasses.replace(foot, **changes)  # type: ignore[arg-type]
-
-
 def foot_file(calibration: Calibration) -> str:
     """Return the YAML text of the calibrated foot, for :meth:`Foot.load` and every command.
 
@@ -354,7 +317,7 @@ def from_pressures(pad: Pad, name: str, pressure: Array, height: Array) -> Const
         each = pressure / stiffness_of(pad, pressure, height)
     else:
         each = pressure_for_height(pad, height) / _value(pad, name)
-    fit = _line((each / pressure)[:, None], np.ones_like(pressure))
+    fit = line_through((each / pressure)[:, None], np.ones_like(pressure))
     fit = dataclasses.replace(fit, half_widths=fit.half_widths / fit.values, logarithmic=True)
     unit = {'stiffness': 'N/m', 'factor': '(factor)', 'thickness': 'm'}[name]
     return fit.constant(name, unit, 'free domes')
@@ -382,19 +345,21 @@ def _stiffness(
         least = float(free.pressure.max()) * pad.radius / BURST
 
         def heights(k: Array) -> Array:
-            return np.asarray(inflate(_stiff(pad, k[0]), free.pressure).height)
+            return np.asarray(
+                inflate(with_constant(pad, 'stiffness', float(k[0])), free.pressure).height
+            )
 
-        fit = _fit(heights, free.height, [pad.stiffness], [least])
+        fit = fit_positive(heights, free.height, [pad.stiffness], [least])
         constants.append(fit.constant('stiffness', 'N/m', "of the thesis' law, free domes"))
         _warn_of_trend(pad, free, warnings)
-        return _stiff(pad, fit.values[0])
+        return with_constant(pad, 'stiffness', float(fit.values[0]))
     fit_pressed = _from_pressed(measurements, pad, 'stiffness')
     if fit_pressed is None:
-        constants.append(_kept('stiffness', 'N/m', pad.stiffness, 'no dome was measured'))
+        constants.append(kept_constant('stiffness', 'N/m', pad.stiffness, 'no dome was measured'))
         return pad
     note = "of the thesis' law, pressed domes"
     constants.append(fit_pressed.constant('stiffness', 'N/m', note))
-    return _stiff(pad, fit_pressed.values[0])
+    return with_constant(pad, 'stiffness', float(fit_pressed.values[0]))
 
 
 def _warn_of_trend(pad: Pad, free: FreeDomes, warnings: list[str]) -> None:
@@ -407,7 +372,7 @@ def _warn_of_trend(pad: Pad, free: FreeDomes, warnings: list[str]) -> None:
         )
 
 
-def _from_pressed(measurements: Measurements, pad: Pad, name: str) -> _Fit | None:
+def _from_pressed(measurements: Measurements, pad: Pad, name: str) -> Fit | None:
     """Fit a constant of the pad to height or gap of pressed domes; None if neither is measured."""
     pressed = measurements.pressed
     wall = np.where(np.isnan(pressed.height), pressed.gap, pressed.height)
@@ -430,7 +395,7 @@ def _from_pressed(measurements: Measurements, pad: Pad, name: str) -> _Fit | Non
         return np.asarray(np.where(by_gap, dome.gap, dome.height))
 
     most = {'factor': FACTORS[1], 'thickness': pad.radius}.get(name, math.inf)
-    fit = None if least >= most else _fit(walls, wall[known], [start], [least], [most])
+    fit = None if least >= most else fit_positive(walls, wall[known], [start], [least], [most])
     if fit is None or np.isnan(fit.values).any():
         raise InvalidInput(
             f'{measurements.source}: the pressed domes carry more than the model of a pad of '
@@ -467,7 +432,7 @@ def _of_rubber(
         unit = {'factor': '(factor)', 'thickness': 'm'}[name]
         by_pressed = _from_pressed(measurements, pad, name)
         if by_pressed is None:
-            constants.append(_kept(name, unit, _value(pad, name), 'no dome was measured'))
+            constants.append(kept_constant(name, unit, _value(pad, name), 'no dome was measured'))
             return pad
         found = by_pressed.constant(name, unit, 'pressed domes')
     constants.append(dataclasses.replace(found, note=f'{what}, {found.note}'))
@@ -502,10 +467,6 @@ def _with_range(pad: Pad, material: Material, factor: Constant, warnings: list[s
         return pad
     measured = material.times(factor.value, (factor.low, factor.high))
     return dataclasses.replace(pad, material=measured)
-
-
-def _stiff(pad: Pad, stiffness: float) -> Pad:
-    return dataclasses.replace(pad, stiffness=float(stiffness))
 
 
 def _above_zero(source: str, name: str, values: Array) -> None:
@@ -558,11 +519,11 @@ def _limit(
         if line is not None:
             note = "the start foot's line"
             at = f'{note}, on one pad at {line.pressure:g} Pa'
-            constants.append(_kept('force_limit', 'N', line.force, at))
-            constants.append(_kept('force_limit_slope', 'N/Pa', line.slope, note))
+            constants.append(kept_constant('force_limit', 'N', line.force, at))
+            constants.append(kept_constant('force_limit_slope', 'N/Pa', line.slope, note))
         return pad
     middle = float(pressure.mean())
-    fit = _line(np.column_stack([np.ones_like(pressure), pressure - middle]), limit)
+    fit = line_through(np.column_stack([np.ones_like(pressure), pressure - middle]), limit)
     force, slope = fit.values
     if slope <= 0.0 or force < 0.0:
         raise InvalidInput(
@@ -630,8 +591,10 @@ def _friction(
     friction = measurements.friction
     if not len(friction.load):
         for name in FITTED:
-            kept = _kept(name, UNITS[name], getattr(foot, name), 'no friction was measured')
-            constants.append(kept)
+            entry = kept_constant(
+                name, UNITS[name], getattr(foot, name), 'no friction was measured'
+            )
+            constants.append(entry)
         return foot
     _check_friction(measurements, foot)
     fitted, fit = _identified_friction(friction, foot, floor)
@@ -642,7 +605,7 @@ def _friction(
             )
         else:
             note = 'not identified by these forces: kept'
-            constants.append(_kept(name, UNITS[name], getattr(foot, name), note))
+            constants.append(kept_constant(name, UNITS[name], getattr(foot, name), note))
     if fit is None:
         warnings.append(
             'all constants of friction are kept: the tangential forces identify none of them'
@@ -654,7 +617,12 @@ def _friction(
             f'{", ".join(kept)}: not identified by the tangential forces; the fitted constants of'
             f' friction are valid only if these values of {foot.source} are right'
         )
-    return _with(foot, **dict(zip(fitted, fit.values.tolist(), strict=True)))
+    return _changed(foot, fitted, fit.values)
+
+
+def _changed(foot: Foot, names: Sequence[str], values: Array) -> Foot:
+    changes: dict[str, Any] = dict(zip(names, values.tolist(), strict=True))
+    return dataclasses.replace(foot, **changes)
 
 
 def _check_friction(measurements: Measurements, foot: Foot) -> None:
@@ -676,12 +644,11 @@ def _check_friction(measurements: Measurements, foot: Foot) -> None:
 
 def _identified_friction(
     friction: Friction, foot: Foot, floor: _WetFloor
-) -> tuple[list[str], _Fit | None]:
+) -> tuple[list[str], Fit | None]:
     """Fit as many constants of friction as the forces identify; return their names and the fit."""
 
     def forces(names: Sequence[str], values: Array) -> Array:
-        changed = _with(foot, **dict(zip(names, values.tolist(), strict=True)))
-        return _modelled_forces(friction, changed, floor)
+        return _modelled_forces(friction, _changed(foot, names, values), floor)
 
     fitted: list[str] = []
     fit = None
@@ -697,7 +664,7 @@ def _identified_friction(
         least, most = zip(*(_FRICTION[each][1:] for each in trial), strict=True)
         # The law has kinks: a fit can stop on the wrong side of one.
         attempts = [
-            _fit(model, friction.tangential_force, [*before, factor * start], least, most)
+            fit_positive(model, friction.tangential_force, [*before, factor * start], least, most)
             for factor in (1.0, 0.3, 3.0)
         ]
         best = min(attempts, key=lambda attempt: attempt.cost)
@@ -717,90 +684,3 @@ def _friction_residuals(friction: Friction, foot: Foot, floor: _WetFloor) -> lis
         measured = float(friction.tangential_force[row])
         residuals.append(Residual('tangential_force', setting, pressure, measured, model, True))
     return residuals
-
-
-# --- least squares -------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """Fitted constants."""
-
-    values: Array
-    half_widths: Array  # of the 95 % intervals; for logarithms of the values if ``logarithmic``
-    logarithmic: bool
-    points: int
-    cost: float
-    sensitivity: Array  # derivatives of the residuals (rows) over the constants
-
-    def constant(self, name: str, unit: str, note: str, index: int = 0) -> Constant:
-        value, width = float(self.values[index]), float(self.half_widths[index])
-        if self.logarithmic:
-            low, high = value * math.exp(-width), value * math.exp(width)
-        else:
-            low, high = value - width, value + width
-        return Constant(name, unit, value, low, high, self.points, True, note)
-
-    def identified(self) -> bool:
-        """Return whether the data determine each constant separately."""
-        if not np.isfinite(self.values).all():
-            return False
-        singular = np.linalg.svd(self.sensitivity, compute_uv=False)
-        known = self.half_widths[~np.isnan(self.half_widths)]
-        return bool(
-            singular[-1] > _LEAST_EFFECT * math.sqrt(self.points)
-            and (known < math.log(_WIDEST)).all()
-        )
-
-
-def _fit(
-    model: Callable[[Array], Array],
-    measured: Array,
-    start: Sequence[float],
-    least: Sequence[float],
-    most: Sequence[float] | None = None,
-) -> _Fit:
-    """Fit positive constants within bounds, minimising relative errors."""
-    from scipy.optimize import least_squares
-
-    low = np.log(least) + 1e-9
-    high = np.full(len(low), np.inf) if most is None else np.log(most)
-    first = np.clip(np.log(start), low + 1e-3, high - 1e-3)
-
-    def errors(logarithms: Array) -> Array:
-        error = model(np.exp(logarithms)) / measured - 1.0
-        # Where the model has no value, the error counts as 100 %.
-        return np.where(np.isnan(error), 1.0, error)
-
-    found = least_squares(errors, first, bounds=(low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
-    values = np.exp(found.x)
-    if np.isnan(model(values)).any():
-        values = np.full_like(values, np.nan)
-    widths = _half_widths(found.jac, found.fun)
-    return _Fit(values, widths, True, len(measured), float(found.cost), found.jac)
-
-
-def _line(design: Array, measured: Array) -> _Fit:
-    """Fit the constants of a linear law, minimising absolute errors."""
-    values = np.asarray(np.linalg.lstsq(design, measured, rcond=None)[0], dtype=np.float64)
-    missed = design @ values - measured
-    widths = _half_widths(design, missed)
-    return _Fit(values, widths, False, len(measured), float(missed @ missed), design)
-
-
-def _half_widths(jacobian: Array, residuals: Array) -> Array:
-    """Return half-widths of the intervals; NaN unless there are more points than constants."""
-    from scipy.stats import t as student
-
-    points, constants = jacobian.shape
-    spare = points - constants
-    if spare < 1:
-        return np.full(constants, np.nan)
-    variance = float(residuals @ residuals) / spare
-    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
-    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, spare)
-    return np.asarray(factor * np.sqrt(np.diag(covariance)))
-
-
-def _kept(name: str, unit: str, value: float, note: str) -> Constant:
-    return Constant(name, unit, value, math.nan, math.nan, 0, False, note)

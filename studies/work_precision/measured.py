@@ -14,7 +14,8 @@ from scipy.optimize import brentq
 
 from ros_pad.configuration import shared_folder
 from ros_pad.contact import LARGE_PAD, Material, Pad, force_limit, inflate, press
-from ros_pad.contact.calibrate import Constant, from_pressures
+from ros_pad.contact.calibrate import from_pressures
+from ros_pad.contact.fits import Constant
 from ros_pad.contact.hyperelastic import highest_dome
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array, with_constant
