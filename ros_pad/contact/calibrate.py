@@ -11,26 +11,33 @@ sum of squares at its minimum.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ros_pad.configuration import choice, number
 from ros_pad.contact.dome import BURST, inflate, largest_tension, press
-from ros_pad.contact.film import WATER_VISCOSITY, Film
-from ros_pad.contact.fits import Constant, Fit, fit_positive, kept_constant, line_through
-from ros_pad.contact.foot_file import FITTED, UNITS, foot_text
+from ros_pad.contact.film import WATER_VISCOSITY
+from ros_pad.contact.fits import (
+    Constant,
+    Fit,
+    Residual,
+    above_zero,
+    fit_positive,
+    kept_constant,
+    line_through,
+)
+from ros_pad.contact.foot_file import foot_text
+from ros_pad.contact.friction_fit import WetFloor, fit_friction, friction_residuals
 from ros_pad.contact.hyperelastic import pressure_end, pressure_for_height
 from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, force_limit, largest_pressure
 from ros_pad.contact.material import FACTORS, Material
-from ros_pad.contact.measurements import FreeDomes, Friction, Measurements
+from ros_pad.contact.measurements import FreeDomes, Measurements
 from ros_pad.contact.pad import Array, MeasuredLimit, Pad, with_constant
-from ros_pad.contact.resistance import FOOT_SETTINGS, LIMIT_SETTINGS, PAD_SETTINGS, Foot
+from ros_pad.contact.resistance import LIMIT_SETTINGS, PAD_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
 FITS = ('factor', 'thickness')
@@ -38,54 +45,12 @@ FITS = ('factor', 'thickness')
 # Share by which single points may differ in stiffness before a warning says so.
 _TREND = 0.1
 
-# Start values of the constants of friction for a foot in which they are 0, and lower bounds where
-# a foot file allows 0.
-_STARTS = (0.3, 3e3, 1e4, 0.1, 3e-7, 2.0)
-_LOWEST = (0.0, 1.0, 0.0, 1e-4, 0.0, 0.0)
-_SETTINGS = {each.name: each for each in FOOT_SETTINGS}
-# Start value, and lower and upper bound.
-_FRICTION = {
-    name: (start, max(low, _SETTINGS[name].low), _SETTINGS[name].high)
-    for name, start, low in zip(FITTED, _STARTS, _LOWEST, strict=True)
-}
 # Settings of a foot file for the constants that are checked only after the fit.
 _IN_FOOT = {
     'stiffness': PAD_SETTINGS[1],
     'force_limit': LIMIT_SETTINGS[0],
     'force_limit_slope': LIMIT_SETTINGS[2],
 }
-
-
-@dataclass(frozen=True)
-class Residual:
-    """One measured number and the value of the calibrated model.
-
-    Attributes
-    ----------
-    quantity : str
-        ``height``, ``depth``, ``contact_radius``, ``gap``, ``force_limit``, ``tangential_force``.
-    setting : str
-        Pressure, force and so on of the measurement, in words.
-    pressure : float
-        Gauge pressure, Pa.
-    measured, modelled : float
-        Values in SI units; ``modelled`` is NaN where the model has no equilibrium or no force
-        limit.
-    used : bool
-        Whether the measurement was used in a fit, and not only compared with the model.
-    """
-
-    quantity: str
-    setting: str
-    pressure: float
-    measured: float
-    modelled: float
-    used: bool
-
-    @property
-    def error(self) -> float:
-        """Relative error of the model: modelled / measured - 1."""
-        return self.modelled / self.measured - 1.0 if self.measured else math.nan
 
 
 @dataclass(frozen=True)
@@ -171,13 +136,13 @@ def calibrate(
     limit = _criterion(foot, pad, warnings)
     ceiling = _ceiling(foot.ceiling, pad, limit, warnings)
     foot = dataclasses.replace(foot, pad=pad, limit=limit, ceiling=ceiling)
-    wet_floor = _WetFloor(film_thickness, viscosity)
-    foot = _friction(measurements, foot, wet_floor, constants, warnings)
+    wet_floor = WetFloor(film_thickness, viscosity)
+    foot = fit_friction(measurements, foot, wet_floor, constants, warnings)
     _check_constants(measurements.source, fit, constants)
     residuals = (
         *_shape_residuals(measurements, pad, len(measurements.free.pressure) >= 1),
         *_limit_residuals(measurements, pad),
-        *_friction_residuals(measurements.friction, foot, wet_floor),
+        *friction_residuals(measurements.friction, foot, wet_floor),
     )
     return Calibration(measurements, foot, tuple(constants), residuals, tuple(warnings))
 
@@ -333,7 +298,7 @@ def _check_shapes(measurements: Measurements) -> None:
         ('height of a pressed dome', pressed.height),
         ('gap', pressed.gap),
     ):
-        _above_zero(measurements.source, name, values)
+        above_zero(measurements.source, name, values)
 
 
 def _stiffness(
@@ -469,14 +434,6 @@ def _with_range(pad: Pad, material: Material, factor: Constant, warnings: list[s
     return dataclasses.replace(pad, material=measured)
 
 
-def _above_zero(source: str, name: str, values: Array) -> None:
-    if (values <= 0.0).any():
-        raise InvalidInput(
-            f'{source}: {name} = {values[values <= 0.0][0]:g} is not allowed: a fit needs values'
-            ' above 0'
-        )
-
-
 def _shape_residuals(measurements: Measurements, pad: Pad, used_free: bool) -> list[Residual]:
     free, pressed = measurements.free, measurements.pressed
     residuals = []
@@ -552,135 +509,3 @@ def _limit_residuals(measurements: Measurements, pad: Pad) -> list[Residual]:
         Residual('force_limit', f'{p:g} Pa', p, value, float(model), used)
         for p, value, model in zip(pressure, limit, modelled, strict=True)
     ]
-
-
-# --- friction and film ---------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _WetFloor:
-    film_thickness: float  # m
-    viscosity: float  # Pa s
-
-
-def _modelled_forces(friction: Friction, foot: Foot, floor: _WetFloor) -> Array:
-    """Return the model's largest tangential force for each row of measurements, N."""
-    forces = []
-    for pressure, load, _, wet, stance_time in zip(
-        *(column.tolist() for column in friction), strict=True
-    ):
-        domes = foot.dome_load(load, pressure)
-        sole = load - domes
-        under_domes = under_sole = 0.0
-        if wet:
-            film = Film(foot, floor.viscosity)
-            film.touch_down(floor.film_thickness)
-            under_domes, under_sole = film.drain(domes, sole, pressure, stance_time)
-        forces.append(foot.resistance_of(domes, sole, pressure, under_domes, under_sole))
-    return np.array(forces)
-
-
-def _friction(
-    measurements: Measurements,
-    foot: Foot,
-    floor: _WetFloor,
-    constants: list[Constant],
-    warnings: list[str],
-) -> Foot:
-    """Return the foot with the fitted constants of friction; add constants and warnings."""
-    friction = measurements.friction
-    if not len(friction.load):
-        for name in FITTED:
-            entry = kept_constant(
-                name, UNITS[name], getattr(foot, name), 'no friction was measured'
-            )
-            constants.append(entry)
-        return foot
-    _check_friction(measurements, foot)
-    fitted, fit = _identified_friction(friction, foot, floor)
-    for name in FITTED:
-        if fit is not None and name in fitted:
-            constants.append(
-                fit.constant(name, UNITS[name], f'{len(friction.load)} forces', fitted.index(name))
-            )
-        else:
-            note = 'not identified by these forces: kept'
-            constants.append(kept_constant(name, UNITS[name], getattr(foot, name), note))
-    if fit is None:
-        warnings.append(
-            'all constants of friction are kept: the tangential forces identify none of them'
-        )
-        return foot
-    kept = [name for name in FITTED if name not in fitted]
-    if kept:
-        warnings.append(
-            f'{", ".join(kept)}: not identified by the tangential forces; the fitted constants of'
-            f' friction are valid only if these values of {foot.source} are right'
-        )
-    return _changed(foot, fitted, fit.values)
-
-
-def _changed(foot: Foot, names: Sequence[str], values: Array) -> Foot:
-    changes: dict[str, Any] = dict(zip(names, values.tolist(), strict=True))
-    return dataclasses.replace(foot, **changes)
-
-
-def _check_friction(measurements: Measurements, foot: Foot) -> None:
-    """Raise `InvalidInput` where friction measurements cannot be fitted."""
-    friction = measurements.friction
-    for name in ('load', 'tangential_force'):
-        _above_zero(measurements.source, name, getattr(friction, name))
-    if np.isnan(friction.stance_time[friction.wet]).any():
-        raise InvalidInput(
-            f'{measurements.source}: friction on a wet floor needs stance_time, the time from'
-            ' touch-down to slip, s'
-        )
-    if (friction.pressure > foot.ceiling).any():
-        raise InvalidInput(
-            f'{measurements.source}: pressure = {friction.pressure.max():g} Pa of a friction row'
-            f' is above the ceiling of the foot {foot.source}, {foot.ceiling:g} Pa'
-        )
-
-
-def _identified_friction(
-    friction: Friction, foot: Foot, floor: _WetFloor
-) -> tuple[list[str], Fit | None]:
-    """Fit as many constants of friction as the forces identify; return their names and the fit."""
-
-    def forces(names: Sequence[str], values: Array) -> Array:
-        return _modelled_forces(friction, _changed(foot, names, values), floor)
-
-    fitted: list[str] = []
-    fit = None
-    # A constant is added if the data identify it together with the earlier ones. The second round
-    # is for constants that are identified only after a later one has been added.
-    for name in [*FITTED, *FITTED]:
-        if name in fitted or len(fitted) == len(friction.load):
-            continue
-        trial = [*fitted, name]
-        before: list[float] = [] if fit is None else fit.values.tolist()
-        start = getattr(foot, name) or _FRICTION[name][0]
-        model = functools.partial(forces, trial)
-        least, most = zip(*(_FRICTION[each][1:] for each in trial), strict=True)
-        # The law has kinks: a fit can stop on the wrong side of one.
-        attempts = [
-            fit_positive(model, friction.tangential_force, [*before, factor * start], least, most)
-            for factor in (1.0, 0.3, 3.0)
-        ]
-        best = min(attempts, key=lambda attempt: attempt.cost)
-        if best.identified():
-            fitted, fit = trial, best
-    return fitted, fit
-
-
-def _friction_residuals(friction: Friction, foot: Foot, floor: _WetFloor) -> list[Residual]:
-    modelled = _modelled_forces(friction, foot, floor)
-    residuals = []
-    for row, model in enumerate(modelled.tolist()):
-        pressure, load = float(friction.pressure[row]), float(friction.load[row])
-        shape = f'domes of {pressure:g} Pa' if pressure > 0.0 else 'flat'
-        where = 'wet' if friction.wet[row] else 'dry'
-        setting = f'{shape}, {where}, {load:g} N'
-        measured = float(friction.tangential_force[row])
-        residuals.append(Residual('tangential_force', setting, pressure, measured, model, True))
-    return residuals

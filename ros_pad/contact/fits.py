@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ros_pad.contact.pad import Array
+from ros_pad.errors import InvalidInput
 
 CONFIDENCE = 0.95
 # A constant is identified if its interval is within this factor of its value, and if every change
@@ -46,6 +47,38 @@ class Constant:
     points: int
     fitted: bool
     note: str
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One measured number and the value of the calibrated model.
+
+    Attributes
+    ----------
+    quantity : str
+        ``height``, ``depth``, ``contact_radius``, ``gap``, ``force_limit``, ``tangential_force``.
+    setting : str
+        Pressure, force and so on of the measurement, in words.
+    pressure : float
+        Gauge pressure, Pa.
+    measured, modelled : float
+        Values in SI units; ``modelled`` is NaN where the model has no equilibrium or no force
+        limit.
+    used : bool
+        Whether the measurement was used in a fit, and not only compared with the model.
+    """
+
+    quantity: str
+    setting: str
+    pressure: float
+    measured: float
+    modelled: float
+    used: bool
+
+    @property
+    def error(self) -> float:
+        """Relative error of the model: modelled / measured - 1."""
+        return self.modelled / self.measured - 1.0 if self.measured else math.nan
 
 
 @dataclass(frozen=True)
@@ -132,3 +165,12 @@ def _half_widths(jacobian: Array, residuals: Array) -> Array:
 def kept_constant(name: str, unit: str, value: float, note: str) -> Constant:
     """Return a constant that was not fitted."""
     return Constant(name, unit, value, math.nan, math.nan, 0, False, note)
+
+
+def above_zero(source: str, name: str, values: Array) -> None:
+    """Raise `InvalidInput` where a measured value is not above 0."""
+    if (values <= 0.0).any():
+        raise InvalidInput(
+            f'{source}: {name} = {values[values <= 0.0][0]:g} is not allowed: a fit needs values'
+            ' above 0'
+        )

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib
@@ -12,8 +12,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ros_pad.contact.calibrate import Calibration, Residual
+from ros_pad.contact.calibrate import Calibration
 from ros_pad.contact.dome import BURST, inflate
+from ros_pad.contact.fits import Residual
 from ros_pad.contact.pad import Array, Pad, with_constant
 from ros_pad.reports.style import BLUE, PALE, STYLE, VERMILION
 
@@ -22,7 +23,7 @@ _MARKS = {'height': 'o', 'depth': 'v', 'contact_radius': 's', 'gap': '^', 'force
 
 def draw(calibration: Calibration) -> Figure:
     """Return the picture: one column for each kind of measurement, fit above, residuals below."""
-    rows = {'shape': [], 'force limit': [], 'friction': []}  # type: dict[str, list[Residual]]
+    rows: dict[str, list[Residual]] = {'shape': [], 'force limit': [], 'friction': []}
     names = {'force_limit': 'force limit', 'tangential_force': 'friction'}
     for row in calibration.residuals:
         rows[names.get(row.quantity, 'shape')].append(row)
@@ -31,6 +32,7 @@ def draw(calibration: Calibration) -> Figure:
         figure = Figure(figsize=(4.6 * len(kinds), 6.2), layout='constrained')
         panels = figure.subplots(2, len(kinds), squeeze=False, height_ratios=[3, 2])
         for kind, above, below in zip(kinds, *panels, strict=True):
+            found = rows[kind]
             above.set_title(kind)
             if kind == 'shape' and len(calibration.measurements.free.pressure):
                 _shape(calibration, above)
@@ -38,7 +40,7 @@ def draw(calibration: Calibration) -> Figure:
                 _limit(calibration, above)
             else:
                 scale, unit = (1.0, 'N') if kind == 'friction' else (1e3, 'mm')
-                _points(above, rows[kind], lambda r, s=scale: (s * r.measured, s * r.modelled))
+                _points(above, found, [(scale * r.measured, scale * r.modelled) for r in found])
                 end = 1.05 * max(above.get_xlim()[1], above.get_ylim()[1])
                 above.plot([0.0, end], [0.0, end], color=PALE, lw=1, zorder=0)
                 above.set(xlim=(0.0, end), ylim=(0.0, end))
@@ -47,10 +49,10 @@ def draw(calibration: Calibration) -> Figure:
             below.axhline(0.0, color=PALE, lw=1, zorder=0)
             below.set(ylabel='model over measured − 1, %')
             if kind == 'friction':
-                _points(below, rows[kind], lambda r: (r.measured, 100.0 * r.error))
+                _points(below, found, [(r.measured, 100.0 * r.error) for r in found])
                 below.set(xlabel='measured tangential force, N')
             else:
-                _points(below, rows[kind], lambda r: (r.pressure / 1e3, 100.0 * r.error))
+                _points(below, found, [(r.pressure / 1e3, 100.0 * r.error) for r in found])
                 below.set(xlabel='gauge pressure, kPa')
             if kind == 'shape':
                 title = {'title': 'filled: fitted', 'title_fontsize': 7.5}
@@ -58,18 +60,16 @@ def draw(calibration: Calibration) -> Figure:
     return figure
 
 
-def _points(
-    panel: Axes, rows: Sequence[Residual], at: Callable[[Residual], tuple[float, float]]
-) -> None:
+def _points(panel: Axes, rows: Sequence[Residual], points: Sequence[tuple[float, float]]) -> None:
     """Draw a point for each row, with one entry of the legend for each look."""
     seen = set()
-    for row in rows:
+    for row, point in zip(rows, points, strict=True):
         look = _look(row)
         if look['label'] in seen:
             del look['label']
         else:
             seen.add(look['label'])
-        panel.plot(*at(row), ls='', **look)
+        panel.plot(*point, ls='', **look)
 
 
 def _look(row: Residual) -> dict[str, Any]:
