@@ -45,8 +45,9 @@ def pads_in(area: npt.ArrayLike, radius: npt.ArrayLike) -> Floats:
     Returns
     -------
     float or array
-        Area over 7.794 radius², the hexagon of a dome with a sphere radius of 1.5 radii, not
-        rounded (:func:`design` rounds down). Losses at the edge of the sole are ignored.
+        The ratio of areas, not rounded (:func:`design` rounds down), with 7.794 radius² for each
+        pad: the hexagon of a dome with a sphere radius of 1.5 radii. Losses at the edge of the
+        sole are ignored.
 
     Raises
     ------
