@@ -160,7 +160,7 @@ def test_what_a_constant_is_stands_below_it(name: str, package: str):
 
 
 WITH_EXAMPLES = (
-    'inflate press force_limit pressure_for contact_angle meniscus bridge pads_in foot_force'
+    'inflate press force_limit pressure_for contact_angle meniscus bridge pads_in rise_height'
     ' tangential_resistance Pad.of squeeze wet bath_meniscus FootEstimator BodyEstimator'
     ' MorphologyController Scene.load Robot.load run create SimulatedRegulator BagReader'
     ' PneumaticChannel'

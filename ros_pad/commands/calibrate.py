@@ -55,9 +55,9 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--fit',
         choices=FITS,
-        help='what the shapes of domes give: one factor on the stresses of the material (default '
-        'where there is a material), the thickness of the sheet, or the constants of the law of '
-        'the thesis (default where there is none)',
+        help='what the shapes of domes of a material give: one factor on its stresses (default) '
+        'or the thickness of the sheet; without a material it is the stiffness of the law of the '
+        'thesis',
     )
     part.add_argument(
         '--film-thickness',
@@ -184,17 +184,6 @@ def _values(
         'residuals': [
             plain(asdict(residual) | {'error': residual.error}) for residual in found.residuals
         ],
-        'laws': [
-            {
-                'name': law.name,
-                'constants': law.values.tolist(),
-                'low': [None if math.isnan(end) else end for end in law.low.tolist()],
-                'high': [None if math.isnan(end) else end for end in law.high.tolist()],
-                'pressure_error': law.error,
-            }
-            for law in found.laws
-        ],
-        'comparisons': [plain(asdict(each)) | {'says': str(each)} for each in found.comparisons],
         'warnings': list(found.warnings),
         'foot': str(foot_path),
         'figure': str(figure_path) if figure_path else None,
@@ -220,12 +209,5 @@ def _show(found: Calibration) -> None:
             f'{row.quantity:18} {row.setting:34} {row.measured:11.5g} {row.modelled:11.5g}'
             f'  {error}{mark}'
         )
-    if found.laws:
-        print(f'\n{"law of free domes":18} {"constants":24} error of pressure, rms')
-        for law in found.laws:
-            constants = ' and '.join(f'{value:.4g}' for value in law.values)
-            print(f'{law.name:18} {constants:24} {100.0 * law.error:.2g} %')
-    for comparison in found.comparisons:
-        print(comparison)
     for warning in found.warnings:
         print(f'\nnote: {warning}')

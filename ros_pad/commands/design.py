@@ -20,7 +20,7 @@ from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
 from ros_pad.contact import LARGE_PAD, Design, Foot, Material, Pad, design, pressure_for
 from ros_pad.contact.candidates import Candidate, Span, candidates
-from ros_pad.contact.design import CELL, READINGS
+from ros_pad.contact.design import CELL
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, criteria, resized
 from ros_pad.errors import InvalidInput
 from ros_pad.pace import Progress
@@ -33,10 +33,6 @@ OTHER_RADII = (
 )
 MATERIAL_CRITERION = 'flattening'
 SHEETS = (2.0 / 15.0, 4.0 / 15.0, 6.0 / 15.0)  # thickness over radius: 0.4 mm of 1.5 and others
-OPTIMUM = (
-    'The thesis claims that a pad radius of 0.3 to 0.8 mm is best. Neither set of equations '
-    'confirms this: the liquid stands highest at 2.33 mm (corrected) or 2.67 mm (thesis).'
-)
 
 
 def add(commands: Commands) -> None:
@@ -45,8 +41,7 @@ def add(commands: Commands) -> None:
         commands,
         'design',
         run,
-        'Compute number, load, pressure and height of rise of the pads on a sole, with corrected '
-        'equations and with those printed in the thesis.',
+        'Compute number, load, pressure and height of rise of the pads on a sole.',
         'pad design --load 7 --foot large37 --figure design.png\n'
         'pad design --load 2 --sole-radius 0.017 --material all --thickness 0.2e-3 0.4e-3',
     )
@@ -142,31 +137,28 @@ def run(options: argparse.Namespace) -> int:
         'margin': options.margin,
         'criterion': options.criterion or (own if own in criteria(pad) else DEFAULT_CRITERION),
     }
-    designs = {each: design(options.load, area, pad, reading=each, **rules) for each in READINGS}
+    designs = {'full': design(options.load, area, pad, **rules)}
     if foot is not None and (pad.radius, area) == (foot.pad.radius, foot.sole_area):
-        built = design(options.load, area, pad, pads=foot.pads, **rules)
-        designs = {'as built': built, **designs}
+        designs = {'as built': design(options.load, area, pad, pads=foot.pads, **rules), **designs}
     others = rules
     if rules['criterion'] == 'measured':
         others = rules | {'criterion': DEFAULT_CRITERION}
     with bar('radii', 1.0, 'table', delay=1.0) as progress:
         rows = _over(RADII, options.load, area, pad, others, progress)
     sentences = [
-        *advice(next(iter(designs.values())), rows[0], rules['ceiling']),
+        *advice(next(iter(designs.values())), rows, rules['ceiling']),
         *(() if others is rules else (OTHER_RADII,)),
-        *_overlap('By the equations of the thesis, ', designs['thesis']),
-        OPTIMUM,
     ]
     if options.figure is not None:
         from ros_pad.reports.design import draw
 
         radii = np.linspace(0.3e-3, 2.5e-3, 89).tolist()
         with bar('radii', 1.0, 'figure', delay=1.0) as progress:
-            draw(options.figure, *_over(radii, options.load, area, pad, others, progress))
+            draw(options.figure, _over(radii, options.load, area, pad, others, progress))
     if options.json:
         summary = {
             'designs': [{'name': name, **values(each)} for name, each in designs.items()],
-            'radii': [values(each) for row in rows for each in row],
+            'radii': [values(each) for each in rows],
             'says': sentences,
             'figure': None if options.figure is None else str(options.figure),
         }
@@ -289,13 +281,12 @@ def _over(
     pad: Pad,
     rules: dict[str, Any],
     progress: Progress,
-) -> list[list[Design]]:
-    """Return corrected and printed designs for those radii, m, of which a pad fits on the sole."""
-    fit = [r for r in radii if area >= CELL['corrected'] * r * r and r >= (pad.thickness or 0.0)]
-    found: list[list[Design]] = [[] for _ in READINGS]
+) -> list[Design]:
+    """Return designs for those radii, m, of which a pad fits on the sole."""
+    fit = [r for r in radii if area >= CELL * r * r and r >= (pad.thickness or 0.0)]
+    found = []
     for done, r in enumerate(fit, 1):
-        for designs, reading in zip(found, READINGS, strict=True):
-            designs.append(design(load, area, resized(pad, r), reading=reading, **rules))
+        found.append(design(load, area, resized(pad, r), **rules))
         progress(done / len(fit))
     return found
 
@@ -303,7 +294,6 @@ def _over(
 def values(each: Design) -> dict[str, Any]:
     """Return the values of a design by name with unit; None for values that are not finite."""
     found = {
-        'reading': each.reading,
         'load_n': each.load,
         'area_m2': each.area,
         'radius_m': each.pad.radius,
@@ -317,7 +307,6 @@ def values(each: Design) -> dict[str, Any]:
         'ceiling_pa': each.ceiling,
         'pad_limit_n': each.pad_limit,
         'reachable_load_n': each.reachable_load,
-        'flat_force_n': each.flat_force,
         'dome_width_m': each.dome_width,
         'rise_height_m': each.rise_height,
         'pads_needed': each.pads_needed,
@@ -356,25 +345,14 @@ def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterato
             f'N with a margin of {each.margin:g} at {each.ceiling:.0f} Pa, where {ends}.'
         )
         yield from _remedies(each, candidates)
-    yield from _overlap('', each)
-    if each.pad_limit > 0.0:
-        yield (
-            f'All pads pressed flat at {each.ceiling:.0f} Pa would push with '
-            f'{each.flat_force:.3g} N: {each.flat_force / (each.pads * each.pad_limit):.3g} times '
-            f'the limit {each.criterion}. Equation 3.92 of the thesis uses this force as the '
-            'load of a foot.'
-        )
-
-
-def _overlap(of: str, each: Design) -> Iterator[str]:
     if each.pitch < 2.0 * each.pad.radius:
         yield (
-            f'{of}{each.pads} pads overlap even when flat: {2 * each.pad.radius:.3g} m wide at a '
-            f'pitch of {each.pitch:.3g} m.'
+            f'{each.pads} pads overlap even when flat: {2 * each.pad.radius:.3g} m wide at a pitch'
+            f' of {each.pitch:.3g} m.'
         )
     elif each.touching:
         yield (
-            f'{of}{each.pads} domes touch one another: {each.dome_width:.3g} m wide at a pitch of '
+            f'{each.pads} domes touch one another: {each.dome_width:.3g} m wide at a pitch of '
             f'{each.pitch:.3g} m.'
         )
 
@@ -386,7 +364,7 @@ def _remedies(each: Design, candidates: Sequence[Design]) -> Iterator[str]:
         least = pressure_for(each.pad, 0.0, each.criterion)
         yield f'No number of pads is enough: such a pad carries nothing below {least:.0f} Pa.'
     else:
-        area = each.pads_needed * CELL['corrected'] * each.pad.radius**2
+        area = each.pads_needed * CELL * each.pad.radius**2
         yield (
             f'{each.pads_needed} pads would be enough, on a sole of {area:.3g} m² '
             f'(radius {math.sqrt(area / math.pi):.3g} m).'
@@ -413,14 +391,15 @@ def _area(options: argparse.Namespace, foot: Foot | None) -> float:
     return foot.sole_area
 
 
-def _print(designs: dict[str, Design], rows: Sequence[Sequence[Design]]) -> None:
+def _print(designs: dict[str, Design], rows: Sequence[Design]) -> None:
     first = next(iter(designs.values()))
     print(
         f'{first.load:g} N on a sole of {first.area:.4g} m², pads of radius {first.pad.radius:g} '
         f'm and {first.pad.stiffness:g} N/m, limit {first.criterion}, margin {first.margin:g}'
     )
     table = {name: values(each) for name, each in designs.items()}
-    print(f'\n{"":26}' + ''.join(f'{name:>12}' for name in table))
+    print()
+    lines = []
     for key, text in (
         ('pads', 'pads'),
         ('pitch_m', 'pitch, m'),
@@ -428,23 +407,21 @@ def _print(designs: dict[str, Design], rows: Sequence[Sequence[Design]]) -> None
         ('pressure_pa', 'pressure needed, Pa'),
         ('ceiling_pa', 'ceiling, Pa'),
         ('reachable_load_n', 'reachable load, N'),
-        ('flat_force_n', 'pressure × flat area, N'),
         ('dome_width_m', 'width of the domes, m'),
         ('touching', 'domes touch'),
         ('rise_height_m', 'height of rise, m'),
         ('carried', 'load carried'),
     ):
-        print(f'{text:26}' + ''.join(_cell(each[key], 12) for each in table.values()))
-    print('\n' + f'{"radius":>9}' + ''.join(f'{reading:^36}' for reading in READINGS))
-    names = ''.join(f'{name:>9}' for name in ('pads', 'Pa', 'reach, N', 'rise, m'))
-    print(f'{"m":>9}' + names + names)
-    for pair in zip(*rows, strict=True):
-        cells = ''.join(
-            _cell(values(each)[key], 9)
-            for each in pair
-            for key in ('pads', 'pressure_pa', 'reachable_load_n', 'rise_height_m')
-        )
-        print(f'{pair[0].pad.radius:9.5g}' + cells)
+        lines.append([text, *(_text(each[key]) for each in table.values())])
+    print_table(('', *table), lines)
+    print()
+    keys = ('pads', 'pressure_pa', 'reachable_load_n', 'rise_height_m')
+    known = [(f'{each.pad.radius:.5g}', values(each)) for each in rows]
+    print_table(
+        ('radius, m', 'pads', 'Pa', 'reach, N', 'rise, m'),
+        [[radius, *(_text(each[key]) for key in keys)] for radius, each in known],
+        texts=0,
+    )
 
 
 def _print_candidates(found: Sequence[Candidate]) -> None:
@@ -468,20 +445,15 @@ def _print_candidates(found: Sequence[Candidate]) -> None:
 
 
 def _span(span: Span) -> str:
-    def text(value: float) -> str:
-        if math.isinf(value):
-            return 'none'
-        return f'{value:.0f}' if value >= 1e3 else f'{value:.3g}'
-
-    value, low, high = (text(each) for each in span)
+    value, low, high = (_text(each) for each in span)
     return value if low == high else f'{value} ({low} to {high})'
 
 
-def _cell(value: object, width: int) -> str:
+def _text(value: object) -> str:
     if isinstance(value, bool):
-        text = 'yes' if value else 'no'
-    elif isinstance(value, float):
-        text = f'{value:.0f}' if value >= 1e3 else f'{value:.3g}'
-    else:
-        text = '-' if value is None else str(value)
-    return f'{text:>{width}}'
+        return 'yes' if value else 'no'
+    if isinstance(value, float):
+        if math.isinf(value):
+            return 'none'
+        return f'{value:.0f}' if value >= 1e3 else f'{value:.3g}'
+    return '-' if value is None else str(value)

@@ -2,15 +2,7 @@
 """Contact of one inflated pad with the floor (thesis chapter 3)."""
 
 from ros_pad.contact.bridge import Bridge, bridge
-from ros_pad.contact.design import (
-    DESIGN_WATER,
-    Design,
-    design,
-    design_pressure,
-    foot_force,
-    pads_in,
-    rise_height,
-)
+from ros_pad.contact.design import DESIGN_WATER, Design, design, pads_in, rise_height
 from ros_pad.contact.dome import Inflated, Pressed, inflate, press
 from ros_pad.contact.fibre import fibre_meniscus
 from ros_pad.contact.film import Film, film_thickness
@@ -56,10 +48,8 @@ __all__ = [
     'capillary_pull',
     'contact_angle',
     'design',
-    'design_pressure',
     'fibre_meniscus',
     'film_thickness',
-    'foot_force',
     'force_limit',
     'hysteresis_force',
     'inflate',

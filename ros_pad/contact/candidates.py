@@ -19,11 +19,10 @@ import numpy as np
 from ros_pad.configuration import number
 from ros_pad.contact.design import pads_for
 from ros_pad.contact.dome import inflate
-from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.laws import highest_dome, pressure_for_height, with_constant
+from ros_pad.contact.hyperelastic import highest_dome, pressure_end, pressure_for_height
 from ros_pad.contact.limits import force_limit, pressure_for
 from ros_pad.contact.material import Material
-from ros_pad.contact.pad import MeasuredLimit, Pad
+from ros_pad.contact.pad import MeasuredLimit, Pad, with_constant
 from ros_pad.errors import NoEquilibrium
 from ros_pad.pace import Progress
 

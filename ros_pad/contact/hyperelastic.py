@@ -167,6 +167,46 @@ def pressure_end(pad: Pad) -> tuple[float, str]:
     return end * unit, str(STATUS[NO_INFLATION if balloons else OUT_OF_RANGE])
 
 
+def pressure_for_height(pad: Pad, height: Array) -> Array:
+    """Return the pressures, Pa, at which free domes of a pad of a material have these heights.
+
+    Parameters
+    ----------
+    pad : Pad
+        A pad of a material.
+    height : array
+        Heights, m, above 0.
+
+    Raises
+    ------
+    InvalidInput
+        When a height is above the largest one.
+    """
+    end, status = pressure_end(pad)
+    highest = highest_dome(pad)
+    if (height > highest).any():
+        why = (
+            'there it balloons'
+            if status == 'no_inflation'
+            else f'there its range ends, a uniaxial stretch of {pad.material.uniaxial_end:.4g}'  # type: ignore[union-attr]
+        )
+        raise InvalidInput(
+            f'height = {height.max():g} m of a free dome is not allowed on {pad}: at most'
+            f' {highest:.6g} m, at {end:.6g} Pa, is allowed; {why}'
+        )
+    low, high = np.zeros_like(height), np.full_like(height, end)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        short = inflate_rubber(pad, middle).height < height
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return np.asarray(0.5 * (low + high))
+
+
+def highest_dome(pad: Pad) -> float:
+    """Return the height of the highest free dome of a pad of a material, m."""
+    return float(inflate_rubber(pad, pressure_end(pad)[0]).height)
+
+
 def refusal(pad: Pad) -> dict[int, str]:
     """Return why a pad of a material is refused, by status code."""
     end = pressure_end(pad)[0]

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -190,6 +190,19 @@ class Pad:
             made += '' if self.edge is None else f', {self.edge} at its edge'
             return f'a pad with radius = {self.radius:g} m and {made}'
         return f'a pad with radius = {self.radius:g} m and stiffness = {self.stiffness:g} N/m'
+
+
+def with_constant(pad: Pad, name: str, value: float) -> Pad:
+    """Return a pad with another ``stiffness``, ``factor`` or ``thickness``."""
+    if name == 'stiffness':
+        return replace(pad, stiffness=value)
+    material, thickness = pad.material, pad.thickness
+    assert material is not None and thickness is not None
+    if name == 'factor':
+        material = material.times(value)
+    else:
+        thickness = value
+    return Pad.of(material, pad.radius, thickness, pad.measured_limit, pad.edge)
 
 
 def need_stiffness(what: str, pad: Pad) -> None:

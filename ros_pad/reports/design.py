@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of pad designs: load and height of rise of a sole over the radius of its pads."""
+"""Figures of pad designs: a sole over the radius of its pads, and pads of materials."""
 
 from __future__ import annotations
 
@@ -10,45 +10,52 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ros_pad.contact import Design, foot_force, rise_height
+from ros_pad.contact import Design, rise_height
 from ros_pad.contact.candidates import Candidate, Span
 from ros_pad.contact.design import DOME
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import BLACK, BLUE, STANCE, VERMILION, WIDE
-
-CLAIMED = (0.3, 0.8)  # mm, best radius as the thesis claims
+from ros_pad.reports.style import BLACK, BLUE, VERMILION, WIDE
 
 
-def draw(
-    path: str | os.PathLike[str], corrected: Sequence[Design], thesis: Sequence[Design]
-) -> None:
-    """Draw designs for one sole and load over the pad radius, corrected and as in the thesis.
+def draw(path: str | os.PathLike[str], designs: Sequence[Design]) -> None:
+    """Draw designs for one sole and load over the pad radius.
 
     Parameters
     ----------
     path : path
         Ends in .png, .svg or .pdf. An existing file is replaced.
-    corrected, thesis : sequence of Design
-        Results of :func:`ros_pad.contact.design` for the same rising radii.
+    designs : sequence of Design
+        Results of :func:`ros_pad.contact.design` for rising radii.
 
     Raises
     ------
     InvalidInput
         When the path has another ending, or no pad of the drawn radii fits on the sole.
     """
-    if not corrected:
+    if not designs:
         raise InvalidInput(
             'the sole is too small: no pad with a radius from 0.3 to 2.5 mm fits on it; leave out'
             ' --figure'
         )
 
     def figure() -> Figure:
-        found = Figure(figsize=(WIDE, 3.2), layout='constrained')
-        loads, heights = found.subplots(1, 2)
-        _loads(loads, corrected, thesis)
-        _heights(heights, corrected, thesis)
-        return found
+        drawn = Figure(figsize=(WIDE, 3.2), layout='constrained')
+        loads, heights = drawn.subplots(1, 2)
+        first, r = designs[0], np.array([each.pad.radius for each in designs])
+        reach = np.array([each.reachable_load for each in designs])
+        reach[reach <= 0.0] = np.nan  # a logarithmic axis cannot show a load of zero
+        loads.plot(1e3 * r, reach, color=BLUE, lw=1.8, label=f'force limit {first.criterion}')
+        loads.axhline(first.load, color=BLACK, lw=1.0, ls=':', label='load')
+        loads.set(yscale='log', ylabel='load of the foot, N', title='(a) what a sole carries')
+        # Use ideal cells: the cells of a design vary, because its number of pads is rounded.
+        heights.plot(1e3 * r, 1e3 * rise_height(r), color=BLUE, lw=1.8, label='height of rise')
+        heights.plot(1e3 * r, 2e3 * DOME * r, color=BLACK, lw=1.0, ls=':', label='gap full')
+        heights.set(ylabel='height of rise, mm', title='(b) liquid between the domes')
+        for axes in (loads, heights):
+            axes.set(xlim=(0.0, 2.5), xlabel='radius of the pads, mm')
+            axes.legend()
+        return drawn
 
     write_picture(path, figure)
 
@@ -104,51 +111,3 @@ def _bar(axes: Axes, scale: float, span: Span, place: float, colour: str, mark: 
         fill = 'full' if np.isfinite(value) else 'none'
         at = value if np.isfinite(value) else low
         axes.plot(at, place, mark, color=colour, ms=4.0, fillstyle=fill)
-
-
-def _loads(axes: Axes, corrected: Sequence[Design], thesis: Sequence[Design]) -> None:
-    for designs, colour in ((corrected, BLUE), (thesis, VERMILION)):
-        each = designs[0]
-        r = np.array([design.pad.radius for design in designs])
-        flat = foot_force(each.area, r, each.pad.stiffness, each.reading)
-        reach = np.array([design.reachable_load for design in designs])
-        reach[reach <= 0.0] = np.nan  # a logarithmic axis cannot show a load of zero
-        axes.plot(1e3 * r, flat, '--', color=colour, lw=1.2)
-        axes.plot(1e3 * r, reach, color=colour, lw=1.8, label=each.reading)
-    axes.axhline(each.load, color=BLACK, lw=1.0, ls=':', label='load')
-    axes.plot([], [], color=BLACK, lw=1.8, label=f'force limit {each.criterion}')
-    axes.plot([], [], '--', color=BLACK, lw=1.2, label='all pads flat (3.92)')
-    axes.set_yscale('log')
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, 8.0 * high)  # room for the legend
-    axes.set_ylabel('load of the foot, N')
-    axes.set_title('(a) what a sole carries')
-    _dress(axes)
-    axes.legend(ncols=2, loc='upper right')
-
-
-def _heights(axes: Axes, corrected: Sequence[Design], thesis: Sequence[Design]) -> None:
-    for designs, colour in ((corrected, BLUE), (thesis, VERMILION)):
-        r = np.array([design.pad.radius for design in designs])
-        # Use ideal cells: the cells of a design vary, because its number of pads is rounded.
-        height = rise_height(r, reading=designs[0].reading)
-        axes.plot(1e3 * r, 1e3 * height, color=colour, lw=1.8, label=designs[0].reading)
-    axes.plot(1e3 * r, 2e3 * DOME * r, color=BLACK, lw=1.0, ls=':', label='gap full')
-    axes.set_ylim(0.0, 7.5)
-    axes.set_ylabel('height of rise, mm')
-    axes.set_title('(b) liquid between the domes')
-    axes.text(
-        *(float(np.mean(CLAIMED)), 7.3),
-        'optimum\nclaimed\nin the\nthesis',
-        ha='center',
-        va='top',
-        fontsize=7.5,
-    )
-    _dress(axes)
-    axes.legend(loc='lower right')
-
-
-def _dress(axes: Axes) -> None:
-    axes.axvspan(*CLAIMED, color=STANCE, lw=0, zorder=0)
-    axes.set_xlim(0.0, 2.5)
-    axes.set_xlabel('radius of the pads, mm')

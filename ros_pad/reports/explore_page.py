@@ -17,7 +17,7 @@ from typing import Any
 
 from ros_pad import configuration
 from ros_pad.contact import Foot
-from ros_pad.contact.calibrate import foot_text
+from ros_pad.contact.foot_file import foot_text
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.errors import PadError
 from ros_pad.reports import explore_drawings

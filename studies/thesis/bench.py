@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ros_pad.contact.calibrate import stiffness_of
-from ros_pad.contact.design import DESIGN_WATER, rise_height
+from ros_pad.contact.design import DESIGN_WATER
 from ros_pad.contact.dome import MODELS, inflate, press
 from ros_pad.contact.film import Film
 from ros_pad.contact.limits import force_limit
@@ -37,6 +37,7 @@ from studies.thesis.bench_scene import (
     TangentialBench,
 )
 from studies.thesis.explained import MINIMAL, Claim
+from studies.thesis.sole import rise
 
 FIDELITY = 'analytic'
 
@@ -663,11 +664,11 @@ def _rise(setup: TangentialBench) -> tuple[list[Row], dict[str, Curve]]:
     claimed = f'{1e3 * setup.claimed_smallest:g} to {1e3 * setup.claimed_largest:g} mm'
     rows, curves = [], {}
     for name, (reading, liquid) in RISE.items():
-        heights = rise_height(radii, liquid, reading)
+        heights = rise(radii, liquid, reading)
         curves[f'rise, {name}'] = Curve(radii, heights)
         best = int(np.nanargmax(heights))
         near = np.linspace(radii[max(best - 1, 0)], radii[min(best + 1, len(radii) - 1)], 1001)
-        heights = rise_height(near, liquid, reading)
+        heights = rise(near, liquid, reading)
         best = int(np.nanargmax(heights))
         for quantity, value, claim in (
             ('radius of greatest rise', near[best], claimed),

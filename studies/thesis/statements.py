@@ -10,7 +10,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ros_pad.capillary import bath_meniscus
-from ros_pad.contact.design import design_pressure, foot_force, pads_in
 from ros_pad.contact.dome import inflate, press
 from ros_pad.contact.film import Film
 from ros_pad.contact.limits import force_limit, largest_pressure, resized
@@ -19,6 +18,7 @@ from ros_pad.contact.meniscus import WATER, capillary_pull, hysteresis_force, me
 from ros_pad.contact.pad import LARGE_PAD, Pad
 from ros_pad.contact.resistance import Foot
 from studies.thesis.explained import MINIMAL, Claim
+from studies.thesis.sole import CELLS, FLAT, TENSION
 
 PRESSURE = 75e3  # Pa gauge
 FORCES = (0.08, 0.19, 0.285)  # N, as the program of the thesis presses
@@ -156,7 +156,7 @@ def _ring() -> tuple[Claim, ...]:
 def _domes() -> tuple[Claim, ...]:
     area = 1.5 * 2.0 * (1.5 + math.sqrt(1.25))  # of the dome with R = 1.5 r, over π r²
     r, k = LARGE_PAD.radius, LARGE_PAD.stiffness
-    needed = float(design_pressure(r, k))
+    needed = TENSION['corrected'] * k / r
     end = largest_pressure(LARGE_PAD, 'flattening')
     widest = float(inflate(LARGE_PAD, end).sphere_radius) / r
     section = '3.1.3'
@@ -187,15 +187,8 @@ def _domes() -> tuple[Claim, ...]:
 
 
 def _soles() -> tuple[Claim, ...]:
-    r, k = LARGE_PAD.radius, LARGE_PAD.stiffness
-    pads, pressure, force = (
-        float(function('thesis') / function('corrected'))
-        for function in (
-            lambda reading: pads_in(1.0, r, reading),
-            lambda reading: design_pressure(r, k, reading),
-            lambda reading: foot_force(1.0, r, k, reading),
-        )
-    )
+    pads = CELLS['corrected'] / CELLS['thesis']
+    pressure, force = (each['thesis'] / each['corrected'] for each in (TENSION, FLAT))
     small = resized(dataclasses.replace(LARGE_PAD, thickness=None), 0.5e-3)
     small = dataclasses.replace(small, thickness=LARGE_PAD.thickness)
     per_area = [
@@ -218,7 +211,7 @@ def _soles() -> tuple[Claim, ...]:
         Claim(
             0,
             'Pressure for R = 1.5 r₀ (3.89).',
-            f'{float(design_pressure(1.0, 1.0)):.4f} k/r₀.',
+            f'{TENSION["corrected"]:.4f} k/r₀.',
             (pressure,),
             abs(pressure - 1.0) <= 0.01,
             section,
@@ -228,7 +221,7 @@ def _soles() -> tuple[Claim, ...]:
         Claim(
             0,
             'Force that presses all pads of a foot flat (3.92).',
-            f'{float(foot_force(1.0, 1.0, 1.0)):.3f} k S/r₀, {force:.2f} times less.',
+            f'{FLAT["corrected"]:.3f} k S/r₀, {force:.2f} times less.',
             (force,),
             abs(force - 1.0) <= MINIMAL,
             section,

@@ -14,9 +14,11 @@ from scipy.optimize import brentq
 
 from ros_pad.configuration import shared_folder
 from ros_pad.contact import LARGE_PAD, Material, Pad, force_limit, inflate, press
-from ros_pad.contact.laws import Law, highest_dome, rubber_laws, stiffness_law, with_constant
+from ros_pad.contact.calibrate import from_pressures
+from ros_pad.contact.fits import Constant
+from ros_pad.contact.hyperelastic import highest_dome
 from ros_pad.contact.measurements import Measurements
-from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import Array, with_constant
 from ros_pad.errors import InvalidInput
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PURPLE, VERMILION
 from studies.work_precision.comparison import Method, Problem
@@ -96,7 +98,7 @@ def points() -> Points:
 def models() -> tuple[Model, ...]:
     """Return the laws, each with its constant fitted to the free domes (cap: as in the thesis)."""
     free = thesis().free
-    stiffness = stiffness_law(LARGE_PAD.radius, free.pressure, free.height)
+    stiffness = from_pressures(LARGE_PAD, 'stiffness', *free)
     caps = (LARGE_PAD, *_ends(LARGE_PAD, stiffness))
     material = Material.load('dragon_skin_10')
     sheet = Pad.of(material, LARGE_PAD.radius, THICKNESS)
@@ -114,14 +116,14 @@ def _fitted(pad: Pad) -> tuple[Pad, ...]:
     """Return a pad with its factor fitted to the heights that it can have, and both ends."""
     free = thesis().free
     known = free.height < highest_dome(pad)
-    factor = rubber_laws(pad, free.pressure[known], free.height[known])[0]
-    return (with_constant(pad, factor.name, float(factor.values[0])), *_ends(pad, factor))
+    factor = from_pressures(pad, 'factor', free.pressure[known], free.height[known])
+    return (with_constant(pad, factor.name, factor.value), *_ends(pad, factor))
 
 
-def _ends(pad: Pad, law: Law) -> tuple[Pad, Pad]:
+def _ends(pad: Pad, law: Constant) -> tuple[Pad, Pad]:
     return (
-        with_constant(pad, law.name, float(law.low[0])),
-        with_constant(pad, law.name, float(law.high[0])),
+        with_constant(pad, law.name, law.low),
+        with_constant(pad, law.name, law.high),
     )
 
 

@@ -54,23 +54,17 @@ def test_the_table_and_the_residuals_are_printed(here, capsys):
     assert cli.main(['calibrate', THESIS, *out, '--force']) == 0
 
 
-def test_a_material_has_a_factor_and_is_compared(here, capsys):
+def test_a_material_has_a_factor(here, capsys):
     material = ['--material', 'dragon_skin_10', '--thickness', '0.4e-3']
     assert cli.main(['calibrate', THESIS, *material, '--json']) == 0
     found = json.loads(capsys.readouterr().out)
     assert found['constants'][0]['name'] == 'factor'
     assert found['constants'][0]['value'] == pytest.approx(1.88, abs=0.005)
-    laws = {law['name']: law for law in found['laws']}
-    assert laws['two constants']['pressure_error'] < laws['factor']['pressure_error']
-    assert [each['first_chance'] is None for each in found['comparisons']] == [
-        *(False, False, False, True)
-    ]
     assert Foot.load(found['foot']).pad.material.factor == pytest.approx(1.88, abs=0.005)
     assert (here / found['figure']).stat().st_size > 20_000
     out = ['--out', 'thick.yaml', '--fit', 'thickness']
     assert cli.main(['calibrate', THESIS, '--foot', found['foot'], *out]) == 0
-    said = capsys.readouterr().out
-    assert 'factor and thickness give the same domes' in said
+    capsys.readouterr()
     assert Foot.load('thick.yaml').pad.thickness == pytest.approx(0.4e-3, rel=0.01)
 
 

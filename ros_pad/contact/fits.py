@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Least squares with 95 % intervals, and the constants that they give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ros_pad.contact.pad import Array
+from ros_pad.errors import InvalidInput
+
+CONFIDENCE = 0.95
+# A constant is identified if its interval is within this factor of its value, and if every change
+# of the constants by 1 % changes the modelled data by more than one part in 10^5.
+_WIDEST = 10.0
+_LEAST_EFFECT = 1e-3
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One constant after a calibration.
+
+    Attributes
+    ----------
+    name, unit : str
+        Name and unit of the constant.
+    value : float
+        Value in this unit.
+    low, high : float
+        95 % interval; NaN where there are no more points than constants, or nothing was fitted.
+    points : int
+        Number of measurements used for the fit.
+    fitted : bool
+        True if fitted, False if kept from the start foot.
+    note : str
+        Purpose of the constant, or the reason why it was kept.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    points: int
+    fitted: bool
+    note: str
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One measured number and the value of the calibrated model.
+
+    Attributes
+    ----------
+    quantity : str
+        ``height``, ``depth``, ``contact_radius``, ``gap``, ``force_limit``, ``tangential_force``.
+    setting : str
+        Pressure, force and so on of the measurement, in words.
+    pressure : float
+        Gauge pressure, Pa.
+    measured, modelled : float
+        Values in SI units; ``modelled`` is NaN where the model has no equilibrium or no force
+        limit.
+    used : bool
+        Whether the measurement was used in a fit, and not only compared with the model.
+    """
+
+    quantity: str
+    setting: str
+    pressure: float
+    measured: float
+    modelled: float
+    used: bool
+
+    @property
+    def error(self) -> float:
+        """Relative error of the model: modelled / measured - 1."""
+        return self.modelled / self.measured - 1.0 if self.measured else math.nan
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted constants."""
+
+    values: Array
+    half_widths: Array  # of the 95 % intervals; for logarithms of the values if ``logarithmic``
+    logarithmic: bool
+    points: int
+    cost: float
+    sensitivity: Array  # derivatives of the residuals (rows) over the constants
+
+    def constant(self, name: str, unit: str, note: str, index: int = 0) -> Constant:
+        """Return one of the constants with its interval."""
+        value, width = float(self.values[index]), float(self.half_widths[index])
+        if self.logarithmic:
+            low, high = value * math.exp(-width), value * math.exp(width)
+        else:
+            low, high = value - width, value + width
+        return Constant(name, unit, value, low, high, self.points, True, note)
+
+    def identified(self) -> bool:
+        """Return whether the data determine each constant separately."""
+        if not np.isfinite(self.values).all():
+            return False
+        singular = np.linalg.svd(self.sensitivity, compute_uv=False)
+        known = self.half_widths[~np.isnan(self.half_widths)]
+        return bool(
+            singular[-1] > _LEAST_EFFECT * math.sqrt(self.points)
+            and (known < math.log(_WIDEST)).all()
+        )
+
+
+def fit_positive(
+    model: Callable[[Array], Array],
+    measured: Array,
+    start: Sequence[float],
+    least: Sequence[float],
+    most: Sequence[float] | None = None,
+) -> Fit:
+    """Fit positive constants within bounds, minimising relative errors."""
+    from scipy.optimize import least_squares
+
+    low = np.log(least) + 1e-9
+    high = np.full(len(low), np.inf) if most is None else np.log(most)
+    first = np.clip(np.log(start), low + 1e-3, high - 1e-3)
+
+    def errors(logarithms: Array) -> Array:
+        error = model(np.exp(logarithms)) / measured - 1.0
+        # Where the model has no value, the error counts as 100 %.
+        return np.where(np.isnan(error), 1.0, error)
+
+    found = least_squares(errors, first, bounds=(low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    values = np.exp(found.x)
+    if np.isnan(model(values)).any():
+        values = np.full_like(values, np.nan)
+    widths = _half_widths(found.jac, found.fun)
+    return Fit(values, widths, True, len(measured), float(found.cost), found.jac)
+
+
+def line_through(design: Array, measured: Array) -> Fit:
+    """Fit the constants of a linear law, minimising absolute errors."""
+    values = np.asarray(np.linalg.lstsq(design, measured, rcond=None)[0], dtype=np.float64)
+    missed = design @ values - measured
+    widths = _half_widths(design, missed)
+    return Fit(values, widths, False, len(measured), float(missed @ missed), design)
+
+
+def _half_widths(jacobian: Array, residuals: Array) -> Array:
+    """Return half-widths of the intervals; NaN unless there are more points than constants."""
+    from scipy.stats import t as student
+
+    points, constants = jacobian.shape
+    spare = points - constants
+    if spare < 1:
+        return np.full(constants, np.nan)
+    variance = float(residuals @ residuals) / spare
+    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
+    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, spare)
+    return np.asarray(factor * np.sqrt(np.diag(covariance)))
+
+
+def kept_constant(name: str, unit: str, value: float, note: str) -> Constant:
+    """Return a constant that was not fitted."""
+    return Constant(name, unit, value, math.nan, math.nan, 0, False, note)
+
+
+def above_zero(source: str, name: str, values: Array) -> None:
+    """Raise `InvalidInput` where a measured value is not above 0."""
+    if (values <= 0.0).any():
+        raise InvalidInput(
+            f'{source}: {name} = {values[values <= 0.0][0]:g} is not allowed: a fit needs values'
+            ' above 0'
+        )

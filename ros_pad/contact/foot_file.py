@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Text of a foot file, for :meth:`ros_pad.contact.Foot.load` and every command."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+from ros_pad.contact.pad import Pad
+from ros_pad.contact.resistance import FOOT_SETTINGS, Foot
+from ros_pad.errors import InvalidInput
+
+FITTED = (
+    *('friction', 'shear_strength', 'conforming_pressure'),
+    *('boundary_friction', 'critical_film', 'film_exponent'),
+)
+"""Constants of friction in the order in which they are fitted."""
+UNITS = {each.name: each.unit for each in FOOT_SETTINGS}
+
+
+def foot_text(
+    foot: Foot, description: str, head: Iterable[str], comments: Mapping[str, str]
+) -> str:
+    """Return the YAML text of a foot, for :meth:`Foot.load`.
+
+    Parameters
+    ----------
+    foot : Foot
+        The foot.
+    description : str
+        What the file states under this key.
+    head : iterable of str
+        Lines of the comment at the top.
+    comments : mapping of str to str
+        What the comment behind a constant has after its unit, by name of the constant.
+    """
+    pad, limit = foot.pad, foot.pad.measured_limit
+
+    def entry(name: str, value: float, unit: str, indent: str = '') -> str:
+        # PyYAML reads 1e-05 as text: a number needs a decimal point.
+        text = f'{value:.9g}'
+        text = text if '.' in text else text.replace('e', '.0e') if 'e' in text else f'{text}.0'
+        return f'{f"{indent}{name}: {text}":35} # {unit}'
+
+    def known(name: str, unit: str, value: float, indent: str = '', other: str = '') -> str:
+        comment = comments.get(other or name, 'of the start foot')
+        return entry(name, value, f'{unit}, {comment}', indent)
+
+    lines = [
+        *(f'# {line}' for line in head),
+        # In quotes: a path may contain characters with a meaning in YAML.
+        f'description: {json.dumps(description, ensure_ascii=False)}',
+        '',
+        'pad:',
+        entry('radius', pad.radius, 'm', '  '),
+    ]
+    if pad.material is None:
+        if pad.thickness is not None:
+            lines.append(entry('thickness', pad.thickness, 'm', '  '))
+        lines += [
+            known('stiffness', 'N/m', pad.stiffness, '  '),
+            entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
+        ]
+    else:
+        lines += _material_lines(pad, comments, entry)
+    if limit is not None:
+        lines += [
+            '  measured_limit: # of one pad',
+            known('force', 'N', limit.force, '    ', 'force_limit'),
+            entry('pressure', limit.pressure, 'Pa gauge', '    '),
+            known('slope', 'N/Pa', limit.slope, '    ', 'force_limit_slope'),
+        ]
+    lines += ['', f'pads: {foot.pads}', entry('sole_radius', foot.sole_radius, 'm')]
+    lines += [known(name, UNITS[name], getattr(foot, name)) for name in FITTED]
+    lines += [
+        entry('shear_stiffness', foot.shear_stiffness, 'N/m of the whole foot'),
+        entry('chamber_volume', foot.chamber_volume, 'm3 of air without the domes'),
+        entry('ceiling', foot.ceiling, 'Pa gauge'),
+        entry('capillary_force', foot.capillary_force, 'N a dome, of the start foot'),
+        f'force_limit: {foot.limit}',
+    ]
+    return '\n'.join(lines) + '\n'
+
+
+def _material_lines(
+    pad: Pad, comments: Mapping[str, str], entry: Callable[..., str]
+) -> Iterator[str]:
+    """Yield the lines of a foot file for material, thickness and factor of a pad."""
+    material = pad.material
+    assert material is not None and material.factor_range is not None
+    if not material.name:
+        raise InvalidInput(
+            f'the material {material} has no name: a foot file needs one that was loaded from a'
+            ' file (Material.load)'
+        )
+    yield f'  material: {json.dumps(material.name, ensure_ascii=False)}'
+    yield entry('thickness', pad.thickness, f'm, {comments.get("thickness", "as given")}', '  ')
+    yield f'  factor: # on the stresses of the material, {comments.get("factor", "as given")}'
+    for name, value in zip(
+        ('value', 'low', 'high'), (material.factor, *material.factor_range), strict=True
+    ):
+        yield entry(name, value, '(factor)', '    ')
