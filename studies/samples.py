@@ -37,3 +37,11 @@ def auc(positive: np.ndarray, negative: np.ndarray) -> float:
     ranks = stats.rankdata(np.concatenate([positive, negative]))
     wins = ranks[: len(positive)].sum() - 0.5 * len(positive) * (len(positive) + 1)
     return float(wins / (len(positive) * len(negative)))
+
+
+def share_interval(hits: int, count: int) -> list[float]:
+    """Return the 95 % interval of a share (Wilson 1927)."""
+    if not count:
+        return [0.0, 1.0]
+    interval = stats.binomtest(hits, count).proportion_ci(method='wilson')
+    return [float(interval.low), float(interval.high)]
