@@ -12,7 +12,6 @@ from ros_pad.contact.design import (
     rise_height,
 )
 from ros_pad.contact.dome import Inflated, Pressed, inflate, press
-from ros_pad.contact.fibre import fibre_meniscus
 from ros_pad.contact.film import Film, film_thickness
 from ros_pad.contact.limits import force_limit, pressure_for
 from ros_pad.contact.material import Material
@@ -57,7 +56,6 @@ __all__ = [
     'contact_angle',
     'design',
     'design_pressure',
-    'fibre_meniscus',
     'film_thickness',
     'foot_force',
     'force_limit',
