@@ -49,7 +49,7 @@ _ADVICE = {
     'far_apart': 'in gaps this wide the surface is not level: use --method energy; --loose accepts'
     ' a level surface',
 }
-# Relative errors of heights that are returned, measured: `studies liquid_limits`, docs/capillary.md.
+# Relative errors of heights that are returned, as measured by `studies liquid_limits`.
 _ERRORS = {'energy': (-0.14, 0.18), 'force': (-0.13, 0.29), 'thesis': (-0.13, 0.29)}
 _ERROR_OF_LEVEL = (-0.03, 0.0)
 _DESCRIPTION = """\
@@ -67,8 +67,8 @@ Methods:
   layers    the thesis': arcs of a circle round a pad, a level surface between many; fast
   energy    a surface of triangles of least energy: some seconds, errors below 1 %
 
-  height error     relative: of layers the range that a study measured, of energy an estimate from \
-a coarser mesh
+  height error     of layers the range that a study measured, of energy an estimate from a \
+coarser mesh
   pull             towards the floor, of method energy
   pressure         of the liquid, relative to the air: below 0 the liquid pulls
   force            pressure times projected section: the thesis' estimate of the force on one \
