@@ -13,7 +13,8 @@ from ros_pad.capillary.menisci import (
     wet_surface,
 )
 from ros_pad.capillary.mesh import Mesh
-from ros_pad.capillary.surface import Line, LiquidSurface, minimise
+from ros_pad.capillary.rails import Line
+from ros_pad.capillary.surface import LiquidSurface, minimise
 
 __all__ = [
     'BathMeniscus',

@@ -12,8 +12,9 @@ from ros_pad.capillary.bath import BathMeniscus, Wall, bath_meniscus
 from ros_pad.capillary.faces import KNOTS, Face, Integers
 from ros_pad.capillary.layers import WETTING
 from ros_pad.capillary.mesh import Mesh
+from ros_pad.capillary.rails import Line
 from ros_pad.capillary.sections import centre
-from ros_pad.capillary.surface import Line, LiquidSurface, minimise
+from ros_pad.capillary.surface import LiquidSurface, minimise
 from ros_pad.configuration import instance, integer, number
 from ros_pad.contact.meniscus import GRAVITY, Liquid, hysteresis_force
 from ros_pad.contact.pad import Array
