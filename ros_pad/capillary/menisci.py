@@ -312,10 +312,25 @@ class WetSurface:
     liquid: Liquid
 
     def hysteresis_force(self, direction: float, advancing: float, receding: float) -> float:
-        """Return the largest force of the pinned line against a motion, N.
+        """Return the largest force of the pinned contact line against a motion.
 
-        Azimuth and contact angles, rad, as for :meth:`ros_pad.capillary.Wet.hysteresis_force`,
-        also InvalidInput.
+        Parameters
+        ----------
+        direction : float
+            Azimuth of the motion, rad from the x axis.
+        advancing, receding : float
+            Contact angles at which the line starts to move, rad, from 0 to pi; advancing >=
+            receding.
+
+        Returns
+        -------
+        float
+            Force, N, as :meth:`ros_pad.capillary.Wet.hysteresis_force`.
+
+        Raises
+        ------
+        InvalidInput
+            When an angle is not finite or out of range.
         """
         azimuth = number('direction', direction, 'rad', low=-math.inf)
         width = np.ptp(self.line[:, 1] * math.cos(azimuth) - self.line[:, 0] * math.sin(azimuth))
