@@ -5,9 +5,16 @@ from ros_pad.capillary.bath import BathMeniscus, Wall, bath_meniscus
 from ros_pad.capillary.coupling import WetPad, press_wet
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.layers import Wet, WetPattern, wet, wet_pattern
-from ros_pad.capillary.menisci import bath_surface, pattern_surface, spanned
+from ros_pad.capillary.menisci import (
+    WetSurface,
+    bath_surface,
+    pattern_surface,
+    spanned,
+    wet_surface,
+)
 from ros_pad.capillary.mesh import Mesh
-from ros_pad.capillary.surface import Line, LiquidSurface, minimise
+from ros_pad.capillary.rails import Line
+from ros_pad.capillary.surface import LiquidSurface, minimise
 
 __all__ = [
     'BathMeniscus',
@@ -19,6 +26,7 @@ __all__ = [
     'Wet',
     'WetPad',
     'WetPattern',
+    'WetSurface',
     'bath_meniscus',
     'bath_surface',
     'minimise',
@@ -27,4 +35,5 @@ __all__ = [
     'spanned',
     'wet',
     'wet_pattern',
+    'wet_surface',
 ]

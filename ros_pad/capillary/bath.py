@@ -3,7 +3,7 @@
 
 Far away the surface is flat, at floor level, where the liquid has the pressure of the air; at
 height z above the floor its pressure relative to the air is ``-ρ g z``. The surface outside a
-circle is one curve for each radius and slope (:func:`ros_pad.contact.fibre.outer_surface`). So the
+circle is one curve for each radius and slope (:func:`outer_surface`). So the
 only unknown is the place on the wall at which a surface with the contact angle has the height of
 this place.
 
@@ -24,7 +24,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import instance, number, quantity
-from ros_pad.contact.fibre import outer_surface
 from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, NoSurface
@@ -296,18 +295,16 @@ def bath_meniscus(
 
     Examples
     --------
-    A dome with the force of the water on it, in micronewtons; and a fibre, the
-    limit of thin walls:
+    A dome with the force of the water on it, in micronewtons; and a wholly wetted fibre:
 
     >>> from ros_pad.capillary import Wall, bath_meniscus
-    >>> from ros_pad.contact import WATER, fibre_meniscus
+    >>> from ros_pad.contact import WATER, Liquid
     >>> found = bath_meniscus(1.55e-3, 0.583e-3, liquid=WATER)
     >>> round(1e3 * found.height, 3), round(1e6 * found.force), found.status
     (0.889, 384, 'ok')
-    >>> fibre = bath_meniscus(wall=Wall.cylinder(0.5e-3), liquid=WATER)
-    >>> exact = fibre_meniscus(0.5e-3, WATER.surface_tension, WATER.angle, WATER.density)
-    >>> round(fibre.height / exact, 9)
-    1.0
+    >>> fibre = bath_meniscus(wall=Wall.cylinder(1e-3), liquid=Liquid(0.073, 0.073))
+    >>> round(1e3 * fibre.height, 3)
+    1.839
     """
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
@@ -329,7 +326,7 @@ def bath_meniscus(
     if status == 'dry' or slope == 0.0:
         line = np.array([radius]), np.array([height])
         return BathMeniscus(0.0, radius, 0.0, 0.0, 0.0, 0.0, *line, status)
-    _, radii, heights = length * _surface(radius / length, slope, FINE, POINTS)[:, ::-1]
+    _, radii, heights = length * outer_surface(radius / length, slope, FINE, POINTS)[:, ::-1]
     _clear_of(wall, place, radii, heights)
     volume = (
         math.pi * radius**2 * height
@@ -423,17 +420,74 @@ def solid_volume(wall: Wall, place: float) -> float:
 
 def bath_height(radius: float, slope: float, tolerance: float = FINE) -> float:
     """Return the height of the surface at a radius and slope, in capillary lengths."""
-    return float(_surface(radius, slope, tolerance)[2, -1]) if slope else 0.0
+    return float(outer_surface(radius, slope, tolerance)[2, -1]) if slope else 0.0
 
 
-def _surface(radius: float, slope: float, tolerance: float, points: int = 2) -> Array:
-    """Return slope, radius and height of the surface, from far away inwards.
+def outer_surface(radius: float, slope: float, tolerance: float = 1e-12, points: int = 2) -> Array:
+    """Compute the surface of a wide bath outside a circle on which its slope angle is given.
 
-    A negative slope is the mirror image below the bath.
+    Parameters
+    ----------
+    radius : float
+        Radius of the circle, in capillary lengths, above 0.
+    slope : float
+        Angle by which the surface falls outwards at the circle, rad, from -pi to pi, not 0. Above
+        pi/2 the surface first goes inwards, under the circle; below 0 it is the mirror image below
+        the bath.
+    tolerance : float
+        Approximate relative error of the heights.
+    points : int
+        Number of points to return, from 2.
+
+    Returns
+    -------
+    array, shape (3, points)
+        Slope angle (rad), radius and height above the bath (capillary lengths), from far away to
+        the circle, at equal steps of the logarithm of the slope.
+
+    Notes
+    -----
+    With ψ the slope angle at radius r and height z, ``dr/dψ = -cos ψ / (z + sin ψ / r)`` and
+    ``dz/dψ = sin ψ / (z + sin ψ / r)``. They are integrated over ln ψ, from the linear surface far
+    away, ``z/ψ = K0(r)/K1(r)``, to the circle.
     """
-    if slope > 0.0:
-        return outer_surface(radius, slope, tolerance, points)
-    return outer_surface(radius, -slope, tolerance, points) * np.array([[-1.0], [1.0], [-1.0]])
+    from scipy.integrate import solve_ivp
+    from scipy.optimize import brentq
+    from scipy.special import k0e, k1e
+
+    if slope < 0.0:
+        mirror = np.array([[-1.0], [1.0], [-1.0]])
+        return mirror * outer_surface(radius, -slope, tolerance, points)
+    outer = 1e-6 * slope  # at this slope the surface is linear, with an error of 1e-12
+
+    def surface(distance: float) -> Array:
+        """Return ln slope, r - radius and z of a surface that is linear from this distance on."""
+        start = radius + distance
+
+        def rates(log: float, state: Array) -> tuple[float, float]:
+            psi, r = math.exp(log), radius + state[0]
+            rise = math.sin(psi)
+            pull = psi / (state[1] + rise / r)
+            return -math.cos(psi) * pull, rise * pull
+
+        ends = math.log(outer), math.log(slope)
+        path = solve_ivp(
+            rates,
+            ends,
+            (distance, outer * k0e(start) / k1e(start)),
+            method='DOP853',
+            rtol=10.0 * tolerance,
+            atol=(tolerance * min(radius, 1.0), tolerance * outer),
+            t_eval=np.linspace(*ends, points),
+        )
+        return np.vstack([path.t, path.y])
+
+    # The slope decays at least as fast as exp(-2/3 distance), so 25 is far enough.
+    distance = brentq(
+        lambda far: math.log1p(surface(far)[1, -1] / radius), 0.0, 25.0, xtol=tolerance
+    )
+    log, beyond, height = surface(distance)
+    return np.vstack([np.exp(log), radius + beyond, height])
 
 
 def _reach(wall: Wall, end: float, length: float) -> float:

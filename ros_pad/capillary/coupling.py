@@ -114,6 +114,17 @@ def press_wet(
         equilibrium was found near that of the rigid pad.
     InvalidInput
         When a value is not finite or out of range.
+
+    Examples
+    --------
+    By how much the water of a bath lowers a pad:
+
+    >>> from ros_pad.capillary import press_wet
+    >>> from ros_pad.contact import LARGE_PAD, WATER
+    >>> found = press_wet(LARGE_PAD, pressure=75e3, force=0.1, liquid=WATER)
+    >>> assert found.rigid is not None
+    >>> f'{100 * (found.gap / found.rigid.gap - 1):.2f} %'
+    '-0.06 %'
     """
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')

@@ -204,8 +204,7 @@ class Face:
         Parameters
         ----------
         mesh : Mesh, or pair of arrays
-            Points (n, 3), m, and triangles (m, 3), or an object with ``points`` and ``faces`` or
-            with ``vertices`` and ``triangles``. The mesh is only the wall, or the closed pad:
+            Points (n, 3), m, and triangles (m, 3). The mesh is only the wall, or the closed pad:
             horizontal parts (bottom and top) are ignored.
         centre : array, shape (2,)
             x and y of a vertical line inside the pad, m.
@@ -227,12 +226,7 @@ class Face:
         quadratics, because contact angles need smooth slopes. Edges of the pad are rounded over
         about two triangles.
         """
-        if hasattr(mesh, 'points'):
-            vertices, triangles = mesh.points, mesh.faces
-        elif hasattr(mesh, 'vertices'):
-            vertices, triangles = mesh.vertices, mesh.triangles
-        else:
-            vertices, triangles = mesh
+        vertices, triangles = (mesh.points, mesh.faces) if hasattr(mesh, 'points') else mesh
         points = np.asarray(vertices, float) - np.append(centre, 0.0)
         walls = np.asarray(triangles, dtype=np.int64)
         size = float(np.ptp(points, axis=0).max())

@@ -78,8 +78,6 @@ class Wet:
         x and y of the axis, m.
     top : float
         Height of the mesh, m.
-    floor_angle : float
-        Contact angle on the floor, rad.
     balance : str
         One of ``BALANCES``.
     liquid : Liquid
@@ -95,7 +93,6 @@ class Wet:
     status: npt.NDArray[np.str_]
     axis: tuple[float, float]
     top: float
-    floor_angle: float
     balance: str
     liquid: Liquid
 
@@ -208,12 +205,11 @@ class Wet:
             When the count is out of range.
         """
         integer('count', count, 2, 1000)
-        start = math.cos(self.floor_angle)
-        last = np.arccos(np.clip(start - self.heights / self.curvature_radius, -1.0, 1.0))
-        turn = self.floor_angle + np.linspace(0.0, 1.0, count) * (last - self.floor_angle)[:, None]
+        last = np.arccos(np.clip(1.0 - self.heights / self.curvature_radius, -1.0, 1.0))
+        turn = np.linspace(0.0, 1.0, count) * last[:, None]
         curvature = self.curvature_radius[:, None]
-        inward = curvature * (np.sin(turn) - math.sin(self.floor_angle))
-        r, z = self.floor_radii[:, None] - inward, curvature * (start - np.cos(turn))
+        inward = curvature * np.sin(turn)
+        r, z = self.floor_radii[:, None] - inward, curvature * (1.0 - np.cos(turn))
         x = self.axis[0] + r * np.cos(self.azimuths)[:, None]
         y = self.axis[1] + r * np.sin(self.azimuths)[:, None]
         return np.stack([x, y, z], axis=2)
@@ -285,7 +281,6 @@ def wet(
     layers: int = 100,
     slices: int = 36,
     axis: tuple[float, float] | None = None,
-    floor_angle: float = 0.0,
     strict: bool = True,
 ) -> Wet:
     """Compute the height to which liquid climbs around one pad.
@@ -306,8 +301,6 @@ def wet(
         Number of slices around the axis, from 3. Each slice has its own balance.
     axis : tuple of float, optional
         x and y of the axis, m; by default the centroid of the lowest layer.
-    floor_angle : float
-        Contact angle on the floor, rad, from 0 (the floor is completely wet) to below pi/2.
     strict : bool
         Refuse heights that are ``far_off``. If False they are returned, up to 3 times too high or
         low; use them only for comparison.
@@ -337,27 +330,25 @@ def wet(
     _check(mesh, liquid, balance)
     integer('layers', layers, 4, 100000)
     integer('slices', slices, 3, 3600)
-    number('floor_angle', floor_angle, 'rad', high=math.nextafter(0.5 * math.pi, 0.0))
     if axis is None:
         axis = centre(mesh, 0.5 * mesh.height / layers)
     else:
         axis = _pair(axis)
     cut = walls(mesh, layers, slices, axis)
-    return _climb(cut, liquid, balance, floor_angle, axis, strict)
+    return _climb(cut, liquid, balance, axis, strict)
 
 
 def _climb(
     cut: Walls,
     liquid: Liquid,
     balance: str,
-    floor_angle: float,
     axis: tuple[float, float],
     strict: bool,
 ) -> Wet:
     """Solve the balance of every slice of a wall."""
     z, r, a = cut.heights, cut.radii, cut.inclinations
     cells, rows = z.size - 1, np.arange(len(r))
-    place, least, no_rise = _places(cut, liquid, balance, floor_angle)
+    place, least, no_rise = _places(cut, liquid, balance)
     judge = least if strict else place
     status = _first_statuses(place, judge, no_rise, cells)
     place = np.where(status == 'ok', place, np.nan)
@@ -371,7 +362,7 @@ def _climb(
 
     heights = np.where(status == 'ok', z[-1] / cells * place, np.nan)
     radii, angles = here(r), here(a)
-    top = _Arc(heights[:, None], radii[:, None], angles[:, None], liquid.angle, floor_angle)
+    top = _Arc(heights[:, None], radii[:, None], angles[:, None], liquid.angle)
     for j in np.flatnonzero(status == 'ok'):
         wall = np.interp(top.z[j, 0], z, r[j])
         through = (top.r[j, 0] < wall - _THROUGH_WALL * heights[j]).any()
@@ -394,7 +385,6 @@ def _climb(
         status=status,
         axis=axis,
         top=float(z[-1]),
-        floor_angle=floor_angle,
         balance=balance,
         liquid=liquid,
     )
@@ -412,7 +402,7 @@ def _first_statuses(
 
 
 def _places(
-    cut: Walls, liquid: Liquid, balance: str, floor_angle: float
+    cut: Walls, liquid: Liquid, balance: str
 ) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Find the heights of the balance and of the lowest energy of each slice, in layers.
 
@@ -421,7 +411,7 @@ def _places(
     theta, tension = liquid.angle, liquid.surface_tension
     weight = liquid.density * GRAVITY
     z, r, a = cut.heights, cut.radii, cut.inclinations
-    arc = _Arc(z, r, a, theta, floor_angle)
+    arc = _Arc(z, r, a, theta)
 
     # Per radian of azimuth: moments of the liquid's section, and the area of the wall below.
     inner = _cumulative(z, r**2), _cumulative(z, z * r**2)
@@ -430,7 +420,7 @@ def _places(
     wall = np.concatenate([np.zeros((len(r), 1)), np.cumsum(slant, axis=1)], axis=1)
     covered = 0.5 * (arc.floor_radius**2 - r[:, :1] ** 2)
 
-    free = arc.area - math.cos(floor_angle) * covered - math.cos(theta) * wall
+    free = arc.area - covered - math.cos(theta) * wall
     least = _lowest(np.where(arc.open, weight * lifted + tension * free, np.inf))
     no_rise = ~arc.open[:, 1]
     if balance == 'energy':
@@ -450,18 +440,17 @@ class _Arc:
     r over the arc length; ``open`` is true where an arc exists. ``r`` and ``z`` are its points.
     """
 
-    def __init__(self, height: Array, wall: Array, slope: Array, theta: float, floor: float):
+    def __init__(self, height: Array, wall: Array, slope: Array, theta: float):
         last = math.pi - theta - slope  # inclination of the arc at the wall
-        self.open = last > floor + 1e-9
-        last = np.where(self.open, last, floor + 1.0)
-        self.radius = height / (math.cos(floor) - np.cos(last))
-        self.floor_radius = wall + self.radius * (np.sin(last) - math.sin(floor))
-        half = 0.5 * (last - floor)[..., None]
-        turn = floor + half * (1.0 + _NODES)
+        self.open = last > 1e-9
+        last = np.where(self.open, last, 1.0)
+        self.radius = height / (1.0 - np.cos(last))
+        self.floor_radius = wall + self.radius * np.sin(last)
+        half = 0.5 * last[..., None]
+        turn = half * (1.0 + _NODES)
         radius = self.radius[..., None]
-        centre = (self.floor_radius + self.radius * math.sin(floor))[..., None]
-        self.r = centre - radius * np.sin(turn)
-        self.z = radius * (math.cos(floor) - np.cos(turn))
+        self.r = self.floor_radius[..., None] - radius * np.sin(turn)
+        self.z = radius * (1.0 - np.cos(turn))
         length = radius * half * _WEIGHTS
         rise = length * np.sin(turn)
         self.area = (self.r * length).sum(axis=-1)

@@ -4,7 +4,6 @@
 from ros_pad.contact.bridge import Bridge, bridge
 from ros_pad.contact.design import DESIGN_WATER, Design, design, pads_in, rise_height
 from ros_pad.contact.dome import Inflated, Pressed, inflate, press
-from ros_pad.contact.fibre import fibre_meniscus
 from ros_pad.contact.film import Film, film_thickness
 from ros_pad.contact.limits import force_limit, pressure_for
 from ros_pad.contact.material import Material
@@ -48,7 +47,6 @@ __all__ = [
     'capillary_pull',
     'contact_angle',
     'design',
-    'fibre_meniscus',
     'film_thickness',
     'force_limit',
     'hysteresis_force',

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
-from ros_pad.capillary import Mesh, Wet, WetPattern
+from ros_pad.capillary import Mesh, Wet, WetPattern, WetSurface
 from ros_pad.capillary.sections import layered, walls
 from ros_pad.reports.files import write_picture
 from ros_pad.reports.style import BLACK, BLUE, WET
@@ -28,6 +29,7 @@ DRY = '#D9D4CC'  # silicone
 WETTED = '#56B4E9'
 _LIGHT = np.array([0.35, -0.65, 0.67])
 _AZIMUTH = -62.0  # degrees, direction of view
+_SURROUNDINGS = 3.0  # radii of the pad up to which a bath is drawn
 _TALLEST = 0.84  # largest share of the height of the picture that the pad takes
 
 
@@ -46,7 +48,7 @@ class Picture:
     line: Array
 
 
-def picture(mesh: Mesh, found: Wet | WetPattern) -> Picture:
+def picture(mesh: Mesh, found: Wet | WetPattern | WetSurface) -> Picture:
     """Return the picture of a wetted mesh."""
     triangles = 1e3 * mesh.points[mesh.faces]
     if isinstance(found, WetPattern):
@@ -55,6 +57,14 @@ def picture(mesh: Mesh, found: Wet | WetPattern) -> Picture:
         dry, wetted = split(triangles, triangles[:, :, 2] - np.nan_to_num(level))
         return Picture(dry, wetted, _disc(mesh, found, level), np.empty((0, 3)))
     x, y, z = np.moveaxis(triangles, 2, 0)
+    if isinstance(found, WetSurface):
+        turns = np.arctan2(*(found.line[:, :2] - found.axis).T[::-1])
+        around = np.arctan2(y - 1e3 * found.axis[1], x - 1e3 * found.axis[0])
+        level = np.interp(around, turns, 1e3 * found.line[:, 2], period=2.0 * math.pi)
+        dry, wetted = split(triangles, z - level)
+        near = _near(mesh, found)
+        line = 1e3 * np.concatenate([found.line, found.line[:1]])
+        return Picture(dry, wetted, near[:, [0, 1, 2, 2]], line)
     turn = np.arctan2(y - 1e3 * found.axis[1], x - 1e3 * found.axis[0])
     heights = np.nan_to_num(found.heights)
     level = 1e3 * np.interp(turn, found.azimuths, heights, period=2.0 * math.pi)
@@ -63,6 +73,14 @@ def picture(mesh: Mesh, found: Wet | WetPattern) -> Picture:
     grid = np.concatenate([grid, grid[:1]])
     surface = _quads(grid)
     return Picture(dry, wetted, surface[np.isfinite(surface).all(axis=(1, 2))], grid[:, -1])
+
+
+def _near(mesh: Mesh, found: WetSurface) -> Array:
+    """Return the triangles of a surface that are near the pad, mm."""
+    corners = found.surface.vertices[found.surface.triangles]
+    far = np.hypot(*np.moveaxis(corners[:, :, :2] - found.axis, 2, 0)).max(axis=1)
+    wide = float(np.hypot(*(mesh.points[:, :2] - found.axis).T).max())
+    return 1e3 * corners[far < _SURROUNDINGS * wide]
 
 
 def split(triangles: Array, field: Array) -> tuple[Array, Array]:
@@ -124,7 +142,7 @@ def _quads(grid: Array) -> Array:
 def draw(
     path: str | os.PathLike[str],
     mesh: Mesh,
-    found: Wet | WetPattern,
+    found: Wet | WetPattern | WetSurface,
     direction: float = 0.0,
 ) -> None:
     """Draw the wetted mesh beside a section (single pad) or the free area by height (pattern).
@@ -135,7 +153,7 @@ def draw(
         Ends in .png, .svg or .pdf. An existing file is replaced.
     mesh : Mesh
         The wetted mesh.
-    found : Wet or WetPattern
+    found : Wet, WetPattern or WetSurface
         The solution for it.
     direction : float
         Azimuth of the section, rad; not used for a pattern.
@@ -148,15 +166,15 @@ def draw(
     write_picture(path, lambda: _figure(mesh, found, direction), dpi=300)
 
 
-def _figure(mesh: Mesh, found: Wet | WetPattern, direction: float) -> Figure:
-    figure = Figure(figsize=(7.0, 2.2 if isinstance(found, Wet) else 2.7))
+def _figure(mesh: Mesh, found: Wet | WetPattern | WetSurface, direction: float) -> Figure:
+    figure = Figure(figsize=(7.0, 2.7 if isinstance(found, WetPattern) else 2.2))
     body: Any = figure.add_axes((-0.12, -0.25, 0.80, 1.45), projection='3d', computed_zorder=False)
     plane = figure.add_axes((0.645, 0.17, 0.33, 0.70))
-    _body(body, picture(mesh, found), 1.2 if isinstance(found, Wet) else 1.0)
-    if isinstance(found, Wet):
-        _section(plane, mesh, found, direction)
-    else:
+    _body(body, picture(mesh, found), 1.0 if isinstance(found, WetPattern) else 1.2)
+    if isinstance(found, WetPattern):
         _void(plane, mesh, found)
+    else:
+        _section(plane, mesh, found, direction)
     for place, words in ((0.015, '(a) pad and liquid'), (0.60, _title(found, direction))):
         figure.text(place, 0.94, words, fontsize=8.0)
     figure.legend(
@@ -169,7 +187,7 @@ def _figure(mesh: Mesh, found: Wet | WetPattern, direction: float) -> Figure:
     return figure
 
 
-def _title(found: Wet | WetPattern, direction: float) -> str:
+def _title(found: Wet | WetPattern | WetSurface, direction: float) -> str:
     if isinstance(found, WetPattern):
         return '(b) room between pads'
     return f'(b) section at {math.degrees(direction):g}°'
@@ -224,17 +242,21 @@ def shaded(triangles: Array, colour: str, alpha: float) -> Array:
     return np.column_stack([rgb, np.full(len(rgb), alpha)])
 
 
-def _section(axes: Axes, mesh: Mesh, found: Wet, direction: float) -> None:
-    slices = len(found.azimuths)
+def _section(axes: Axes, mesh: Mesh, found: Wet | WetSurface, direction: float) -> None:
+    slices = len(found.azimuths) if isinstance(found, Wet) else 360
     cut = walls(mesh, 200, slices, found.axis)
     step = 2.0 * math.pi / slices
-    z, curve = 1e3 * cut.heights, 1e3 * found.surface(65)
-    middle = 1e3 * np.array(found.axis)
+    z, middle = 1e3 * cut.heights, 1e3 * np.array(found.axis)
+    if isinstance(found, Wet):
+        curve = 1e3 * found.surface(65)
     rows = [round((direction + turn) / step) % slices for turn in (math.pi, 0.0)]
     left, right = (1e3 * cut.radii[j] for j in rows)
     axes.fill_betweenx(z, -left, right, color=DRY, lw=0.0, label='pad')
     for j, side, r in zip(rows, (-1.0, 1.0), (left, right), strict=True):
         axes.plot(side * r, z, color=BLACK, lw=0.9)
+        if isinstance(found, WetSurface):
+            _cut_surface(axes, _near(mesh, found) - [*middle, 0.0], step * j, side)
+            continue
         arc = np.hypot(*(curve[j, :, :2] - middle).T)
         if np.isfinite(arc).all():
             height = curve[j, :, 2]
@@ -248,6 +270,25 @@ def _section(axes: Axes, mesh: Mesh, found: Wet, direction: float) -> None:
     axes.set_aspect('equal', adjustable='box')
     axes.set_xlabel('distance from the axis, mm')
     axes.set_ylabel('height, mm')
+
+
+def _cut_surface(axes: Axes, triangles: Array, azimuth: float, side: float) -> None:
+    """Draw the section of a surface round the axis by the half plane of an azimuth."""
+    along = np.array([math.cos(azimuth), math.sin(azimuth)])
+    places = np.stack([triangles[..., :2] @ along, triangles[..., 2]], axis=-1)
+    off = triangles[..., :2] @ (-along[1], along[0]) + 1e-9  # through no corner
+    ends = []
+    for k in range(3):
+        a, b = off[:, k], off[:, k - 2]
+        share = np.where(a * b < 0.0, a / np.where(a == b, 1.0, a - b), np.nan)[:, None]
+        ends.append(places[:, k] + share * (places[:, k - 2] - places[:, k]))
+    segments = np.stack(ends, axis=1)
+    crossed = np.isfinite(segments[..., 0]).sum(axis=1) == 2
+    segments = segments[crossed][np.isfinite(segments[crossed][..., 0])].reshape(-1, 2, 2)
+    segments = segments[segments[:, 0, 0] > 0.0] * (side, 1.0)
+    label = 'liquid' if side > 0.0 else None
+    axes.add_collection(LineCollection(list(segments), colors=BLUE, linewidths=1.4, label=label))
+    axes.autoscale_view()
 
 
 def _void(axes: Axes, mesh: Mesh, found: WetPattern) -> None:

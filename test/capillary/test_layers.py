@@ -227,16 +227,10 @@ def test_a_wide_ring_with_a_flat_surface_pushes(dome: Mesh):
     assert (wet(dome, WATER).pressure > 0.0).all()
 
 
-def test_a_floor_that_is_not_wet_takes_less():
-    mesh = Mesh.cone(1e-3, 2e-3, 4e-3, sectors=180)
-    heights = [
-        wet(mesh, liquid(20.0), floor_angle=math.radians(f)).mean_height for f in (0, 20, 40)
-    ]
-    assert heights[0] > heights[1] > heights[2] > 0.0
-    found = wet(mesh, liquid(20.0), floor_angle=math.radians(40.0))
-    inclination = math.atan2(4.0, 1.0)
-    denominator = math.cos(math.radians(20.0) + inclination) + math.cos(math.radians(40.0))
-    assert found.curvature_radius == pytest.approx(found.heights / denominator, rel=1e-3)
+def test_the_arc_meets_wall_and_floor():
+    found = wet(Mesh.cone(1e-3, 2e-3, 4e-3, sectors=180), liquid(20.0))
+    turn = math.cos(math.radians(20.0) + math.atan2(4.0, 1.0)) + 1.0
+    assert found.curvature_radius == pytest.approx(found.heights / turn, rel=1e-3)
 
 
 # --- Any shape ---------------------------------------------------------------------------------
@@ -473,7 +467,6 @@ def test_slices_that_do_not_meet_the_wall_once_are_refused():
         ({'slices': 2}, 'slices = 2'),
         ({'axis': (0.0,)}, 'axis = (0.0,)'),
         ({'axis': (0.0, math.nan)}, 'axis = nan'),
-        ({'floor_angle': 1.6}, 'floor_angle = 1.6'),
         ({'mesh': 'dome.stl'}, "mesh = 'dome.stl'"),
         ({'liquid': 'water'}, "liquid = 'water'"),
     ],

@@ -82,9 +82,8 @@ def test_bath_round_a_meshed_dome():
     assert np.ptp(heights) < 2e-3 * exact.height
     azimuths = np.linspace(0.0, 6.0, 7)
     closed = dome_mesh(40, 80, lid=True)  # bottom and top are no wall
-    for names in (('points', 'faces'), ('vertices', 'triangles')):
-        mesh = types.SimpleNamespace(**dict(zip(names, closed, strict=True)))
-        assert np.array_equal(Face.of_mesh(mesh).rails(azimuths), face.rails(azimuths))
+    mesh = types.SimpleNamespace(points=closed[0], faces=closed[1])
+    assert np.array_equal(Face.of_mesh(mesh).rails(azimuths), face.rails(azimuths))
 
 
 def test_radii_of_a_meshed_dome_are_second_order():

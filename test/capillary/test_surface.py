@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.menisci import spanned
-from ros_pad.capillary.surface import Line, Rails, System, minimise
+from ros_pad.capillary.rails import Line, Rails
+from ros_pad.capillary.surface import System, minimise
 from ros_pad.errors import InvalidInput, NoSurface
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'

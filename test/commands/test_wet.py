@@ -5,11 +5,13 @@ import json
 import math
 import pathlib
 
+import numpy as np
 import pytest
 
 from ros_pad import cli, configuration
-from ros_pad.capillary import Mesh, wet
-from ros_pad.contact import THESIS_LIQUID, WATER
+from ros_pad.capillary import Mesh, Wall, bath_meniscus, pattern_surface, wet, wet_surface
+from ros_pad.capillary.faces import Face
+from ros_pad.contact import THESIS_LIQUID, WATER, Liquid
 
 DOME = ['wet', 'dome', '--radius', '1.55e-3', '--contact-radius', '0.6e-3']
 SMALL = ['--rings', '16', '--sectors', '24']
@@ -50,7 +52,7 @@ def test_other_shapes_and_many_pads(capsys: pytest.CaptureFixture[str]):
     assert asked(cone, capsys)['height_m'] > 0.0
     cylinder = ['wet', 'cylinder', '--radius', '0.5e-3', '--height', '0.04', '--angle', '0']
     assert cli.main(cylinder) == 1  # too slender for a reliable height
-    assert 'bath_meniscus; --loose' in capsys.readouterr().err
+    assert '--method energy; --loose' in capsys.readouterr().err
     alone = asked([*cylinder, '--loose'], capsys)
     # Pillars on half the area: Jurin's height between them is that in a tube of their radius.
     area = str(2.0 * math.pi * 0.5e-3**2)
@@ -65,6 +67,62 @@ def test_other_shapes_and_many_pads(capsys: pytest.CaptureFixture[str]):
     for name in ('height_m', 'force_n', 'capillary_force_n'):
         assert all_at_once[name] == pytest.approx(one_by_one[name], rel=1e-6)
     assert one_by_one['capillary_force_n'] == pytest.approx(-one_by_one['force_n'] / 7)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('degrees', [3, 30, 80])
+def test_the_error_of_least_energy_holds_the_exact_height(degrees: int):
+    angle = math.radians(degrees)
+    mesh, liquid = Mesh.cylinder(0.5e-3, 6e-3), Liquid(0.073, 0.027, contact_angle=angle)
+    exact = bath_meniscus(wall=Wall.cylinder(0.5e-3, 6e-3, 0.0), liquid=liquid)
+    found = wet_surface(mesh, liquid)
+    off = abs(found.line[:, 2].mean() / exact.height - 1.0)
+    assert off < found.error < 0.04
+    assert -found.surface.forces[0, 2] == pytest.approx(exact.force, rel=2e-3)
+
+
+def test_least_energy_around_one_pad(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    asked_for = [*DOME, '--method', 'energy', '--hysteresis', '100', '60']
+    page, figure = tmp_path / 'it.html', tmp_path / 'it.png'
+    values = asked([*asked_for, '--html', str(page), '--figure', str(figure)], capsys)
+    exact = bath_meniscus(1.55e-3, 0.6e-3, liquid=WATER)
+    assert abs(values['height_m'] / exact.height - 1.0) < values['height_error'][1] < 0.01
+    assert values['pull_n'] == pytest.approx(exact.force, rel=2e-3)
+    assert values['pressure_pa'] == pytest.approx(exact.pressure, rel=5e-3)
+    width = 2.0 * exact.radius * 0.073 * (math.cos(math.radians(60)) - math.cos(math.radians(100)))
+    assert values['capillary_force_n'] == pytest.approx(width, rel=1e-2)
+    assert values['time_s'] > 0.0
+    assert f'{values["height_m"]:.6g} m' in page.read_text()
+    assert figure.read_bytes().startswith(b'\x89PNG')
+
+
+@pytest.mark.slow
+def test_least_energy_between_many_pads_and_off_the_origin(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    sizes = ['--radius', '1.55e-3', '--contact-radius', '0.6e-3', '--height', '2.6e-3']
+    pattern = ['wet', 'pattern', '--pads', '19', '--pitch', '4.4e-3', *sizes, '--method', 'energy']
+    values = asked(pattern, capsys)
+    wall = Face.of_wall(Wall.dome(1.55e-3, 0.6e-3, 2.6e-3))
+    exact = pattern_surface(wall, WATER, 4.4e-3, pressure=0.0)
+    assert values['pull_n'] == pytest.approx(-exact.forces[0, 2], rel=5e-3)
+    assert values['capillary_force_n'] is None
+    mesh = Mesh.dome(1.55e-3, 0.6e-3, 2.6e-3)
+    moved = Mesh(mesh.points + np.array([3e-3, -1e-3, 0.0]), mesh.faces)
+    area = math.sqrt(0.75) * 4.4e-3**2
+    found = wet_surface(moved, WATER, area)
+    assert found.line[:, 2].mean() == pytest.approx(values['height_m'], rel=1e-4)
+    assert found.line[:, :2].mean(axis=0) == pytest.approx([3e-3, -1e-3], abs=1e-6)
+
+
+def test_least_energy_without_an_answer(capsys: pytest.CaptureFixture[str]):
+    low = ['wet', 'cylinder', '--radius', '1e-3', '--height', '1e-3', '--angle', '0']
+    assert cli.main([*low, '--method', 'energy']) == 1
+    assert 'status rim: the liquid reaches the end' in capsys.readouterr().err
+    assert cli.main([*DOME, '--method', 'energy', '--area', '7e-6']) == 2
+    assert 'pitch' in capsys.readouterr().err
+    assert cli.main([*DOME, '--method', 'energy', '--layers', '50']) == 2
+    assert '--layers is only for --method layers' in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -97,7 +155,7 @@ def test_pictures(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
         (['--angle', '0'], 'saturated', 'above the top'),
         (['--tension', '1e-6', '--angle', '60'], 'coarse', 'more --layers'),
         (['--balance', 'thesis', '--angle', '70'], 'far_off', '--balance energy'),
-        (['--area', '1e-3', '--pads', '7'], 'far_apart', 'pattern_surface'),
+        (['--area', '1e-3', '--pads', '7'], 'far_apart', '--method energy'),
     ],
 )
 def test_no_answer_is_a_failure_with_advice(
