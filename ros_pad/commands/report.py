@@ -35,9 +35,8 @@ def add(commands: Commands) -> None:
         'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures',
     )
     part.description = (
-        f'{part.description}\nA page is one file that needs no network; the page of a bag also '
-        'plays the walk.\nFigures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 '
-        'points.'
+        f'{part.description}\nA page is one file that needs no network.\n'
+        'Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.'
     )
     part.add_argument(
         'path', metavar='PATH', nargs='?', type=pathlib.Path, help='folder of a bag or of a sweep'
