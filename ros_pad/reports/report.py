@@ -199,7 +199,7 @@ def _bound(term: dict[str, Any]) -> str:
 
 def _effect(term: dict[str, Any]) -> str:
     """Return the effect of a term, and whether it is above the accuracy of the scene."""
-    if term.get('effect') is None:  # as in bags of versions that did not estimate it
+    if term.get('effect') is None:
         return 'not known'
     note = ', exceeds the accuracy required' if term['exceeds'] else ''
     share = 100.0 * term['effect']
