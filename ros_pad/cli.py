@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import ros_pad
 from ros_pad.commands.command import Help, exit_status
@@ -36,10 +37,13 @@ COMMANDS = {
 """Summary of each command, by the name of its module in ``ros_pad.commands``, in the order of
 ``pad --help``."""
 
-_DESCRIPTION = (
-    'Feet with inflatable pads for legged robots: simulate, record, analyse. '
-    'All values are in SI units; pressures are gauge.'
-)
+_SHIPPED = {
+    **{'scene': 'scenes', 'scenes': 'scenes', 'foot': 'feet', 'material': 'materials'},
+    **{'robot': 'robots', 'mapping': 'mappings'},
+}  # folders of shipped files that a shell completes, by argument
+_DESCRIPTION = """\
+Feet with inflatable pads for legged robots: simulate, record, analyse.
+All values are in SI units; pressures are gauge."""
 _EPILOG = """\
 exit status:
   0    done
@@ -106,14 +110,23 @@ def _command_in(words: Sequence[str]) -> str | None:
 def _complete() -> int:
     """Print the completions of the command line that a shell passes to argcomplete."""
     import argcomplete
+    from argcomplete.completers import FilesCompleter
 
-    from ros_pad.commands import completion
+    from ros_pad import configuration
+
+    def offered(prefix: str, action: argparse.Action, **_: Any) -> list[str]:
+        kind = _SHIPPED.get(action.dest)
+        names = configuration.names(kind) if kind else []
+        return [each for each in names if each.startswith(prefix)] or FilesCompleter()(prefix)
 
     line = os.environ['COMP_LINE'][: int(os.environ['COMP_POINT'])]
     before = line.split()[1:] if line.endswith(' ') else line.split()[1:-1]
     top = parser(_command_in(before))
-    completion.attach(top)
-    argcomplete.autocomplete(top, always_complete_options='long')
+    argcomplete.autocomplete(
+        top,
+        always_complete_options='long',
+        default_completer=offered,  # type: ignore[arg-type]  # takes every callable
+    )
     return 0
 
 

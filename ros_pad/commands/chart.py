@@ -4,13 +4,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 import pathlib
-import subprocess
 
 from ros_pad.commands.command import Commands, add_command
-from ros_pad.commands.folder import new_folder
-from ros_pad.commands.study import checkout_of, run_study
+from ros_pad.commands.study import run_study
 
 CHARTS = ('capillary', 'contact', 'estimator', 'meniscus', 'stability', 'walk')
 
@@ -27,7 +24,7 @@ def add(commands: Commands) -> None:
     )
     part.add_argument(
         'name',
-        choices=(*CHARTS, 'all'),
+        choices=CHARTS,
         help='study to run: stability takes 10 s, contact 15 s, walk about a minute, estimator and'
         ' meniscus a minute and a half each, capillary two minutes',
     )
@@ -42,20 +39,6 @@ def add(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run one work-precision study, or all of them; return the exit status."""
-    if options.name != 'all':
-        words = ['--out', str(options.out)] if options.out else []
-        return run_study(options.name, *words, *(['--json'] if options.json else []))
-    checkout_of(['all'])  # without a checkout, fail before a folder is created
-    folder = options.out or new_folder(None, 'chart_all')
-    rows = []
-    for name in CHARTS:
-        quiet = subprocess.DEVNULL if options.json else None
-        status = run_study(name, '--out', str(folder), stdout=quiet)
-        if status:
-            return status
-        if options.json:
-            rows += json.loads((folder / f'{name}.json').read_text(encoding='utf-8'))['rows']
-    if options.json:
-        print(json.dumps(rows))
-    return 0
+    """Run the work-precision study; return the exit status."""
+    words = ['--out', str(options.out)] if options.out else []
+    return run_study(options.name, *words, *(['--json'] if options.json else []))

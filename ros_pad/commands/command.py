@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
@@ -16,50 +15,19 @@ from typing import TypeAlias
 from ros_pad.errors import BagError, ConfigError, InvalidInput, PadError, reason
 from ros_pad.signals import INTERRUPTED
 
-WIDEST = 98  # largest width of the help in columns, also on a wider terminal
+WIDEST = 98  # largest width of tables in columns, also on a wider terminal
 
 Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 
 
 class Help(argparse.HelpFormatter):
-    """Format help: descriptions keep their lines and columns, but not beyond the page width.
-
-    A line of a list that is too long continues below its second column; a command continues after
-    a backslash, so that it can be pasted into a shell.
-    """
-
-    def __init__(self, prog: str) -> None:
-        width = min(shutil.get_terminal_size().columns - 2, WIDEST)
-        super().__init__(prog, max_help_position=30, width=width)
-
-    def add_argument(self, action: argparse.Action) -> None:
-        """Add an argument, which may make the column of names wider."""
-        super().add_argument(action)
-        if isinstance(action, argparse._SubParsersAction):
-            # argparse forgets that commands are indented: without this, the line of the command
-            # with the longest name would break.
-            self._action_max_length += self._indent_increment
+    """Format help: texts keep their lines; those that are no command are folded where too long."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return '\n'.join(_folded(indent + line, width) for line in text.splitlines())
-
-
-def _folded(line: str, width: int) -> str:
-    margin = line[: len(line) - len(line.lstrip())]
-    if len(line) <= width:
-        return line
-    if not line[len(margin) :].startswith('pad '):
-        # Continue below the second column if this is a list.
-        column = re.match(r'\s*(\S+(?: \S+)*\s{2,})?', line)
-        hanging = ' ' * len(column[0]) if column else margin
-        return textwrap.fill(line, width, subsequent_indent=hanging, drop_whitespace=True)
-    rows = textwrap.wrap(
-        line.strip(),
-        width - len(margin) - 6,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return f' \\\n{margin}    '.join([margin + rows[0], *rows[1:]])
+        return '\n'.join(
+            line if line.lstrip().startswith('pad ') else textwrap.fill(line, width)
+            for line in text.splitlines()
+        )
 
 
 def add_command(

@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import argparse
-import pathlib
 import socket
 
 from ros_pad.commands.command import Commands, add_command
-from ros_pad.commands.folder import refuse_existing
 from ros_pad.configuration import integer
 from ros_pad.contact import Foot
 from ros_pad.errors import InvalidInput
@@ -22,7 +20,7 @@ def add(commands: Commands) -> None:
         run,
         'Show a foot on a page in the browser: dome, sole, grip, force limit and switching time'
         ' follow the sliders. The page is served to this machine alone, until Ctrl-C.',
-        'pad explore\npad explore small217 --out my_foot.yaml',
+        'pad explore\npad explore small217',
     )
     part.add_argument(
         'foot',
@@ -35,24 +33,14 @@ def add(commands: Commands) -> None:
         '--port', type=int, metavar='N', help='number of the TCP port (default: a free one)'
     )
     part.add_argument('--no-browser', action='store_true', help='do not open a browser')
-    part.add_argument(
-        '--out',
-        type=pathlib.Path,
-        metavar='FILE',
-        help='write each foot that the page exports, into this new .yaml file, then _2, _3 and'
-        ' so on',
-    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Serve the page; return the exit status."""
-    refuse_existing('--out', options.out)
-    if options.out is not None and options.out.suffix not in ('.yaml', '.yml'):
-        raise InvalidInput(f'--out {options.out}: a name that ends in .yaml is needed')
     foot = Foot.load(options.foot)
     from ros_pad.reports.explore_page import HOST, serve
 
-    serve(foot, _port(HOST, options.port), not options.no_browser, options.out)
+    serve(foot, _port(HOST, options.port), not options.no_browser)
     return 0
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -12,27 +11,23 @@ from tqdm import tqdm
 
 from ros_pad.pace import Progress
 
-_BEAT = 1.0  # s, between pictures of a bar without reports
-
 
 @contextmanager
 def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterator[Progress]:
     """Show a progress bar on stderr; yield the function that sets its position, 0 to ``total``.
 
     The bar ends full if the last report came within one reporting interval of the end, or if there
-    was no report. After an early end it stays at the last report. Its clock goes on between
-    reports. Where stderr is no terminal, it is shown once a minute. With ``delay``, s, it is shown
-    after that time, and only on a terminal.
+    was no report. After an early end it stays at the last report. Where stderr is no terminal, it
+    is shown once a minute. With ``delay``, s, it is shown after that time, and only on a terminal.
     """
-    shape = '{desc} {percentage:3.0f}% {bar} {n:.0f}/{total:.0f} {unit} [{elapsed}<{remaining}]'
     stride: float | None = None
     terminal = sys.stderr.isatty()
-    over = threading.Event()
     with tqdm(
         total=total,
         desc=text,
         unit=unit,
-        bar_format=shape,
+        bar_format='{desc} {percentage:3.0f}% {bar} {n:.0f}/{total:.0f} {unit} '
+        '[{elapsed}<{remaining}]',
         file=sys.stderr,
         delay=delay or 1.0,  # nothing is written before this block can end its line
         mininterval=0.1 if terminal else 60.0,
@@ -49,18 +44,6 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
             stride = max(stride or 0.0, place - shown.n)
             shown.update(place - shown.n)
 
-        def beat() -> None:
-            while not over.wait(_BEAT):
-                shown.update(0)
-
-        clock = threading.Thread(target=beat, daemon=True)
-        if terminal:
-            clock.start()
-        try:
-            yield show
-        finally:
-            over.set()
-            if terminal:
-                clock.join(_BEAT)  # without end where Ctrl-C comes while tqdm has its lock
+        yield show
         if stride is None or total - shown.n <= 1.01 * stride:
             shown.update(total - shown.n)

@@ -34,14 +34,12 @@ def add(commands: Commands) -> None:
         'replay',
         run,
         'Pass recorded wrenches (N), positions (m) and pressures (Pa) through estimators and '
-        'controller again, and compare the results with the recorded ones; try other parameters.',
+        'controller again, and compare the results with the recorded ones; try other parameters.\n'
+        'The motion stays as recorded: only estimates and decisions may change.\nExit status: 0 no'
+        ' difference except for rounding or after a gap in the recording; 1 another difference; 2 '
+        'bad input.',
         'pad replay bags/hexapod_patches/bag --set wet_prior=0.3 --figure prior.png\n'
         '         pad replay my_bag --remap leg_{leg}/wrench:=/foot_{leg}/ft',
-    )
-    part.description = (
-        f'{part.description}\nThe motion stays as recorded: only estimates and decisions may'
-        ' change.\nExit status: 0 no difference except for rounding or after a gap in the'
-        ' recording; 1 another difference;\n2 bad input.'
     )
     part.add_argument(
         'bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file'

@@ -31,13 +31,9 @@ def add(commands: Commands) -> None:
         'report',
         run,
         'Write the HTML report of a bag or of a sweep, or a page with the figures of the thesis '
-        'as ros_pad computes them; write figures for a paper.',
+        'as ros_pad computes them; write figures for a paper.\nA page is one file that needs no '
+        'network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.',
         'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures',
-    )
-    part.description = (
-        f'{part.description}\nA page is one file that needs no network; the page of a bag also '
-        'plays the walk.\nFigures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 '
-        'points.'
     )
     part.add_argument(
         'path', metavar='PATH', nargs='?', type=pathlib.Path, help='folder of a bag or of a sweep'
@@ -46,9 +42,6 @@ def add(commands: Commands) -> None:
         '--thesis',
         action='store_true',
         help="draw the thesis' figures, without PATH; needs a checkout of ros_pad and about 45 s",
-    )
-    part.add_argument(
-        '--only', type=int, nargs='+', metavar='N', help='with --thesis: figures of these numbers'
     )
     part.add_argument(
         '--out',
@@ -68,8 +61,6 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write page and figures and print their paths; return the exit status."""
-    if options.only and not options.thesis:
-        raise InvalidInput('--only needs --thesis: it chooses figures of the thesis')
     if options.thesis:
         if options.path is not None:
             raise InvalidInput(f'--thesis draws no bag or sweep: leave out {options.path}')
@@ -106,7 +97,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _of_thesis(options: argparse.Namespace) -> int:
     words = ['--force'] if options.force else []
-    words += ['--only', *map(str, options.only)] if options.only else []
     for name in ('out', 'figures'):
         value = getattr(options, name)
         words += [f'--{name}', str(value)] if value is not None else []

@@ -18,6 +18,7 @@ from ros_pad.commands.command import INTERRUPTED, Commands, add_command, complai
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
+from ros_pad.configuration import integer
 from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import ConfigError, InvalidInput, PadError
@@ -116,12 +117,8 @@ def run(options: argparse.Namespace) -> int:
         return _run_bench(options)
     scene = Scene.load(options.scene)
     if options.cycles is not None:
-        if not 1 <= options.cycles <= 100000:
-            raise InvalidInput(
-                f'--cycles = {options.cycles} is not allowed: a whole number from 1 to 100000 is'
-                ' needed'
-            )
-        scene = dataclasses.replace(scene, cycles=options.cycles)
+        cycles = integer('--cycles', options.cycles, 1, 100000)
+        scene = dataclasses.replace(scene, cycles=cycles)
     if options.foot is not None:
         scene = _on_foot(scene, Foot.load(options.foot))
     options.tuning = tuning_for(scene, options.sensing)
@@ -129,11 +126,7 @@ def run(options: argparse.Namespace) -> int:
         known = learnt.load(options.learnt, scene.foot.source)
         changes = {name.replace('.', '_'): value for name, value in known.items()}
         options.tuning = dataclasses.replace(options.tuning, **changes)
-    if not 0 <= options.seed < 2**31:
-        raise InvalidInput(
-            f'--seed = {options.seed} is not allowed: a whole number from 0 to {2**31 - 1} is'
-            ' needed'
-        )
+    integer('--seed', options.seed, 0, 2**31 - 1)
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'
     if options.fidelity == 'auto' and not joints and (promise := levels.answer(scene, policy)):

@@ -34,14 +34,10 @@ def add(commands: Commands) -> None:
         run,
         'Run every combination of scenes, policies, seeds and parameters, without ROS, on all '
         'cores or on a Dask cluster; write trials.csv, a picture with confidence intervals, and a '
-        'page.',
+        'page.\nA sweep that was stopped or killed continues when the same command is given again '
+        'with --out and its folder; seeds, policies, scenes and values may be added.',
         'pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 '
         '--set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing',
-    )
-    part.description = (
-        f'{part.description}\nA sweep that was stopped or killed continues when the same command '
-        'is given again with --out and\nits folder; seeds, policies, scenes and values may be'
-        ' added.'
     )
     part.add_argument(
         'scenes', metavar='SCENE', nargs='+', help='names of scenes, or paths of YAML files'

@@ -32,17 +32,9 @@ from ros_pad.contact import (
     meniscus,
     press,
 )
-from ros_pad.contact.candidates import Span
 from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, largest_pressure
 from ros_pad.contact.pad import DOME_PRESSURE, Array
-from ros_pad.contact.resistance import (
-    DOMED,
-    FOOT_SETTINGS,
-    PAD_SETTINGS,
-    RUBBER_SETTINGS,
-    THICK_FILM,
-)
-from ros_pad.contact.squeeze import STIFF, dome_dimple
+from ros_pad.contact.resistance import DOMED, FOOT_SETTINGS, PAD_SETTINGS, RUBBER_SETTINGS
 from ros_pad.errors import ConfigError, InvalidInput, NoEquilibrium
 from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel, time_to
 
@@ -50,20 +42,11 @@ MEASURED = 'measured stiffness'
 """Choice of the material for pads of a measured stiffness, without a material."""
 LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
 STATES = ('flat, dry', 'flat, wet', 'dome, dry', 'dome, wet')
-DOUBT = 2.0
-"""Factor by which each assumed constant of friction may be wrong, in docs/assumptions.md."""
-ASSUMED = (
-    *('friction', 'shear_strength', 'conforming_pressure'),
-    *('boundary_friction', 'critical_film', 'film_exponent'),
+NOTE = (
+    'Friction rests on assumed constants, each of which may be wrong by a factor of two:'
+    ' docs/assumptions.md. The points on the drawing of the force limit are all criteria that the'
+    ' pads have.'
 )
-BAND = (
-    'Bands: lowest and highest value with one assumption changed at a time. Each assumed constant'
-    ' of friction is halved and doubled, every criterion of the force limit that the pads have is'
-    ' taken, and the factor on the stresses of the material is moved over its range; wet domes'
-    ' may also have no dry contact at all where their film keeps a dimple. They are no confidence'
-    ' intervals.'
-)
-_FACTORS = 9  # over the range of a material, as in ros_pad.contact.candidates
 _LOADS, _PRESSURES = 30, 61  # points of the curves
 _TICK, _LONGEST = 1e-3, 5.0  # s, see time_to
 
@@ -208,14 +191,14 @@ class Explored:
         The pad, its dome free and under its share of the load, and the ring of liquid.
     limits : dict of str to float
         Force limit of one pad by criterion, N; NaN above the largest pressure of a criterion.
-    limit : Span
+    limit : float
         Force limit of the foot, N.
     limit_curve : tuple of array
         Pressures up to the ceiling, Pa, and the limit of the foot there, N.
-    grip : dict of str to Span
+    grip : dict of str to float
         Tangential capacity at the load, N, by state.
     loads, curves
-        Loads, N, and value, lowest and highest capacity there as rows, by state.
+        Loads, N, and the capacity there, N, by state.
     switching : Switching
     places : array
         Centres of the pads, m, as rows.
@@ -231,9 +214,9 @@ class Explored:
     pressed: Pressed | None
     ring: Meniscus | None
     limits: Mapping[str, float]
-    limit: Span | None
+    limit: float | None
     limit_curve: tuple[Array, Array] | None
-    grip: Mapping[str, Span]
+    grip: Mapping[str, float]
     loads: Array
     curves: Mapping[str, Array]
     switching: Switching | None
@@ -311,9 +294,9 @@ def explore(inputs: Inputs) -> Explored:
         limits=limits,
         limit=limit,
         limit_curve=None if foot is None else _limit_curve(foot),
-        grip={state: Span(*curve[:, -1].tolist()) for state, curve in curves.items()},
+        grip={state: float(curve[-1]) for state, curve in curves.items()},
         loads=loads[:-1],
-        curves={state: curve[:, :-1] for state, curve in curves.items()},
+        curves={state: curve[:-1] for state, curve in curves.items()},
         switching=switching,
         places=places,
         pitch=pitch,
@@ -403,47 +386,16 @@ def _limits(pad: Pad, pressure: float) -> dict[str, float]:
     }
 
 
-def _limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts) -> Span:
-    """Return the limit of the foot, N, over the criteria and the factor of the material."""
+def _limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts) -> float:
+    """Return the limit of the foot, N."""
     value = foot.pads * limits[foot.limit]
-    others = [foot.pads * each for each in limits.values() if not math.isnan(each)]
-    spread = foot.pads * _by_factor(foot, inputs.pressure)
-    if np.isnan(spread).any():
-        parts.note(
-            'pressure',
-            'in doubt: were the material as soft as it may be, its model would end below this'
-            ' pressure',
-        )
-    others += spread[~np.isnan(spread)].tolist()
     if inputs.load > value:
         parts.note(
             'load',
             f'above the force limit of the foot by the criterion {foot.limit}, {value:.4g} N: the'
             ' domes are pressed flat, and the sole carries the rest',
         )
-    return Span(value, min(others), max(others))
-
-
-def _by_factor(foot: Foot, pressure: float) -> Array:
-    """Return the limit of a pad, N, over the range of the factor of its material.
-
-    NaN where the model of a pad ends below the pressure.
-    """
-    material = foot.pad.material
-    if material is None or material.factor_range is None or foot.limit == 'measured':
-        return np.zeros(0)
-    factors = np.linspace(*material.factor_range, _FACTORS) / material.factor
-    return _scaled(foot.pad, foot.limit, pressure, tuple(factors.tolist()))
-
-
-@functools.lru_cache(maxsize=8)
-def _scaled(pad: Pad, criterion: str, pressure: float, times: tuple[float, ...]) -> Array:
-    """Return limits of pads with so many times the stresses, N.
-
-    Pads of one shape have forces and pressures in proportion to them.
-    """
-    factors = np.array(times)
-    return np.asarray(factors * force_limit(pad, pressure / factors, criterion))
+    return value
 
 
 def _limit_curve(foot: Foot) -> tuple[Array, Array]:
@@ -462,80 +414,31 @@ def _curves(
         needs = 'load roughness' + ' film stand' * ('wet' in state)
         if 'dome' in state:
             needs += ' pressure'
-        curve = parts(needs, _capacity, inputs, foot, limits, loads, state)
+        curve = parts(needs, _capacity, inputs, foot, loads, state)
         if curve is not None:
             found[state] = curve
     return loads, found
 
 
-def _capacity(
-    inputs: Inputs, foot: Foot, limits: Mapping[str, float], loads: Array, state: str
-) -> Array | None:
-    """Return the capacity under loads, N: value, lowest and highest, as rows."""
+def _capacity(inputs: Inputs, foot: Foot, loads: Array, state: str) -> Array | None:
+    """Return the capacity under loads, N."""
     pressure = inputs.pressure if 'dome' in state else 0.0
     if 'dome' in state and pressure < DOME_PRESSURE:
         return None  # the foot is flat
-    film = inputs.film if 'wet' in state else 0.0
-    own = foot.dome_load(math.inf, pressure)
-    doubted = _doubted(foot, inputs.roughness)
-    cases = [(each, own) for each in doubted]
-    if pressure:
-        others = [*limits.values(), *_by_factor(foot, pressure).tolist()]
-        cases += [(doubted[0], foot.pads * each) for each in others if not math.isnan(each)]
-    rows = [_carried(case, loads, pressure, film, inputs.stand) for case in cases]
-    if pressure and film and _keeps_dimple(inputs, doubted[0], own):
-        rows.append(_carried(cases[0], loads, pressure, film, inputs.stand, THICK_FILM))
-    return np.stack([rows[0], np.min(rows, axis=0), np.max(rows, axis=0)])
-
-
-@functools.lru_cache(maxsize=8)
-def _doubted(foot: Foot, roughness: float) -> tuple[Foot, ...]:
-    """Return a foot on its floor, and with each assumed constant halved and doubled there."""
-    rough = foot.on_rough(roughness)
-    return rough, *(
-        replace(rough, **{name: getattr(rough, name) * times})
-        for name in ASSUMED
-        for times in (1.0 / DOUBT, DOUBT)
-    )
-
-
-def _carried(
-    case: tuple[Foot, float],
-    loads: Array,
-    pressure: float,
-    film: float,
-    stand: float,
-    under_domes: float = 0.0,
-) -> list[float]:
-    """Return the capacity, N, of a foot whose domes carry a largest load, N."""
-    (foot, most), found = case, []
-    films, drained = (0.0, 0.0), Film(foot)
+    most, rough = foot.dome_load(math.inf, pressure), foot.on_rough(inputs.roughness)
+    films, drained, found = (0.0, 0.0), Film(rough), []
     for load in loads.tolist():
         on_domes = min(load, most)
-        if film:
-            drained.touch_down(film)
-            films = drained.drain(on_domes, load - on_domes, pressure, stand)
-        under = under_domes or films[0]
-        found.append(foot.resistance_of(on_domes, load - on_domes, pressure, under, films[1]))
-    return found
-
-
-def _keeps_dimple(inputs: Inputs, foot: Foot, most: float) -> bool:
-    """Return whether a film under domes may keep a dimple: see docs/model/film.md."""
-    load = min(inputs.load, most)
-    if load <= 0.0:
-        return False
-    contact = math.sqrt(load / inputs.pressure / foot.pads / math.pi)
-    sphere = float(inflate(foot.pad, inputs.pressure).sphere_radius)
-    middle = dome_dimple(contact, sphere, inputs.pressure, inputs.stand)
-    film = Film(foot)
-    film.touch_down(inputs.film)
-    return 0.5 * middle >= STIFF * film.drain(load, 0.0, inputs.pressure, inputs.stand)[0]
+        if 'wet' in state:
+            drained.touch_down(inputs.film)
+            films = drained.drain(on_domes, load - on_domes, pressure, inputs.stand)
+        found.append(rough.resistance_of(on_domes, load - on_domes, pressure, *films))
+    return np.array(found)
 
 
 def _touching(inputs: Inputs, foot: Foot) -> float:
     """Return the share of a flat sole that touches."""
-    conforming = _doubted(foot, inputs.roughness)[0].conforming_pressure
+    conforming = foot.on_rough(inputs.roughness).conforming_pressure
     return min(inputs.load / (conforming * foot.sole_area), 1.0)
 
 
@@ -602,28 +505,22 @@ def rows(found: Explored) -> Iterator[tuple[str, list[Row]]]:
     yield (
         'Foot',
         [
-            Row('limit', 'force limit', _span(found.limit, 'N')),
+            Row('limit', 'force limit', _text(found.limit, 'N')),
             Row('pitch', 'pitch of pads', _text(found.pitch, 'mm', 1e-3)),
-            Row('fill', 'fills to 90 % in', _text(switching.fill if switching else math.nan, 's')),
-            Row('vent', 'flat again after', _text(switching.vent if switching else math.nan, 's')),
+            Row('fill', 'fills to 90 % in', _text(switching and switching.fill, 's')),
+            Row('vent', 'flat again after', _text(switching and switching.vent, 's')),
         ],
     )
     yield (
         'Grip',
         [
-            Row(f'grip-{state.replace(", ", "-")}', state, _span(found.grip.get(state), 'N'))
+            Row(f'grip-{state.replace(", ", "-")}', state, _text(found.grip.get(state), 'N'))
             for state in STATES
         ],
     )
 
 
-def _text(value: float, unit: str, size: float = 1.0) -> str:
-    if math.isnan(value):
+def _text(value: float | None, unit: str, size: float = 1.0) -> str:
+    if value is None or math.isnan(value):
         return '–'
     return f'over {_LONGEST:g} {unit}' if math.isinf(value) else f'{value / size:.4g} {unit}'
-
-
-def _span(span: Span | None, unit: str) -> str:
-    if span is None or math.isnan(span.value):
-        return '–'
-    return f'{_text(span.value, unit)} ({span.low:.3g} to {span.high:.3g})'

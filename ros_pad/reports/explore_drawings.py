@@ -35,7 +35,7 @@ STYLE = """
 .drawing .ink { stroke-width: 2; }
 .drawing .flat, .drawing .free { stroke-dasharray: 6 4; }
 .drawing .fill { fill: var(--dry); stroke: none; } .drawing .fill.wet { fill: var(--wet); }
-.drawing .fill.band { opacity: 0.14; } .drawing .fill.contact { opacity: 0.75; }
+.drawing .fill.contact { opacity: 0.75; }
 .drawing .fill.point { fill: var(--ink); }
 """
 
@@ -96,13 +96,6 @@ class Plot:
         """Draw a line."""
         points = zip(x, y, strict=True)
         self.parts.append(_path([(self.x(a), self.y(b)) for a, b in points], kind))
-
-    def band(self, x: Sequence[float], low: Array, high: Array, kind: str) -> None:
-        """Fill between two lines."""
-        edge = [*zip(x, low.tolist(), strict=True), *zip(x, high.tolist(), strict=True)]
-        edge[len(x) :] = reversed(edge[len(x) :])
-        points = [(self.x(a), self.y(b)) for a, b in edge]
-        self.parts.append(_path(points, f'fill band {kind}', closed=True))
 
     def point(self, x: float, y: float, kind: str) -> None:
         """Draw a point."""
@@ -201,17 +194,16 @@ def sole(found: Explored) -> Drawing:
 
 
 def grip(found: Explored) -> Drawing:
-    """Draw the tangential capacity over the load in four states, with bands."""
+    """Draw the tangential capacity over the load in four states."""
     loads, title = found.loads.tolist(), 'Grip over load'
     if not found.curves:
         return Drawing(title, 'No grip can be computed.', _nothing())
-    top = 1.05 * max(float(each[2].max()) for each in found.curves.values())
+    top = 1.05 * max(float(each.max()) for each in found.curves.values())
     plot = Plot(max(loads), top, 'load on the foot, N', 'tangential capacity, N')
-    for state, (value, low, high) in found.curves.items():
+    for state, value in found.curves.items():
         morphology, ground = state.split(', ')
-        plot.band(loads, low, high, ground)
         plot.line(loads, value.tolist(), f'{ground} {morphology}')
-        plot.point(found.inputs.load, found.grip[state].value, ground)
+        plot.point(found.inputs.load, found.grip[state], ground)
     plot.line([found.inputs.load] * 2, [0.0, top], 'axis')
     for place, state in enumerate(STATES):
         morphology, ground = state.split(', ')
@@ -220,7 +212,7 @@ def grip(found: Explored) -> Drawing:
             _path([(x, 12.0), (x + 26.0, 12.0)], f'{ground} {morphology}'),
             _text(x + 31.0, 16.0, state),
         ]
-    alt = '; '.join(f'{state} {span.value:.3g} N' for state, span in found.grip.items())
+    alt = '; '.join(f'{state} {value:.3g} N' for state, value in found.grip.items())
     return Drawing(title, f'Tangential capacity at the load: {alt}.', ''.join(plot.parts))
 
 
@@ -240,7 +232,7 @@ def limits(found: Explored) -> Drawing:
         plot.parts.append(_text(plot.left + 6.0, plot.y(load) - 5.0, 'load'))
     now, lowest = 1e-3 * found.inputs.pressure, math.inf
     if found.limit is not None:
-        plot.line([now, now], [found.limit.low, found.limit.high], 'wet')
+        plot.line([now, now], [min(there.values()), max(there.values())], 'wet')
         side = -9.0 if now > 0.6 * plot.x_end else 9.0
         for name, value in sorted(there.items(), key=lambda each: each[1]):
             lowest = min(plot.y(value) + 4.0, lowest - 13.0)
@@ -268,23 +260,3 @@ def svg(drawing: Drawing) -> str:
 def variables(theme: str) -> str:
     """Return the colours of a theme as CSS."""
     return ' '.join(f'--{name}: {value};' for name, value in COLOURS[theme].items())
-
-
-def picture(found: Explored) -> str:
-    """Return all drawings as one SVG file, for a paper."""
-    parts = []
-    for place, each in enumerate(drawings(found).values()):
-        x, y = place % 2 * (WIDTH + 20.0), place // 2 * (HEIGHT + 36.0)
-        title = _text(0.0, 16.0, each.title, '', 'style="font-weight: bold"')
-        parts.append(
-            f'<g transform="translate({x + 10.0:g} {y + 10.0:g})">{title}'
-            f'<g transform="translate(0 22)">{each.body}</g></g>'
-        )
-    wide, tall = 2.0 * WIDTH + 40.0, 2.0 * HEIGHT + 84.0
-    return (
-        f'<svg class="drawing" xmlns="http://www.w3.org/2000/svg" width="{wide:g}"'
-        f' height="{tall:g}" viewBox="0 0 {wide:g} {tall:g}">'
-        f'<style>svg {{ {variables("light")} }}{STYLE}</style>'
-        f'<rect width="{wide:g}" height="{tall:g}" style="fill: #fff; stroke: none"/>'
-        f'{"".join(parts)}</svg>\n'
-    )

@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import html
 import math
-import pathlib
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -22,10 +21,10 @@ from ros_pad.contact.limits import CRITERIA
 from ros_pad.errors import PadError
 from ros_pad.reports import explore_drawings
 from ros_pad.reports.explore import (
-    BAND,
     FIELDS,
     LIQUIDS,
     MEASURED,
+    NOTE,
     Explored,
     Field,
     Inputs,
@@ -83,7 +82,7 @@ dd {{ margin: 0; font-variant-numeric: tabular-nums; }}
 """
 
 
-def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> None:
+def serve(foot: Foot, port: int, browser: bool) -> None:
     """Serve the page until a signal ends the process.
 
     Parameters
@@ -94,8 +93,6 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
         TCP port on the loopback interface.
     browser : bool
         Open a browser.
-    out : path, optional
-        Each exported foot is written here too, into the next free name.
 
     Raises
     ------
@@ -113,7 +110,7 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
     core.sio.eio.cors_allowed_origins = None
     ui.run(
-        lambda: Page(Inputs.of(foot), out).build(),
+        lambda: Page(Inputs.of(foot)).build(),
         host=HOST,
         port=port,
         title=f'{foot.source} · pad explore',
@@ -177,15 +174,13 @@ class Page:
     ----------
     inputs : Inputs
         What it begins with.
-    out : path, optional
-        As for :func:`serve`.
     """
 
-    def __init__(self, inputs: Inputs, out: pathlib.Path | None) -> None:
+    def __init__(self, inputs: Inputs) -> None:
         from nicegui import ui
 
         self._ui: Any = ui
-        self._inputs, self._out = inputs, out
+        self._inputs = inputs
         self._latest = Latest(lambda: answer(self._inputs), self._show, self._set_pale)
         self._answers = 0
         self._controls: dict[str, Any] = {}
@@ -202,7 +197,6 @@ class Page:
                 ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>', sanitize=False)
                 self._status = ui.label().props('role=status')
                 ui.button('Foot file', on_click=self._export).props('outline no-caps dense')
-                ui.button('Picture', on_click=self._picture).props('outline no-caps dense')
             with ui.element('section').classes('inputs').props('aria-label="Inputs"'):
                 for title, names in _GROUPS.items():
                     ui.html(f'<h2>{title}</h2>', sanitize=False)
@@ -219,7 +213,7 @@ class Page:
                     self._figures[name] = ui.html(sanitize=False)
             with ui.element('section').classes('answer').props('aria-label="Numbers"') as numbers:
                 self._numbers = ui.html(sanitize=False)
-                ui.html(f'<p class="note">{BAND}</p>', sanitize=False)
+                ui.html(f'<p class="note">{NOTE}</p>', sanitize=False)
         self._pale = both, numbers
         self._latest.ask()
 
@@ -302,27 +296,12 @@ class Page:
         self._set_pale('')
 
     async def _export(self) -> None:
-        """Download the foot of the present inputs, and write it if a file was asked for."""
+        """Download the foot of the present inputs."""
         foot = (await asyncio.to_thread(explore, self._inputs)).foot
         if foot is None:
             self._ui.notify('There is no foot: mend what is marked at the inputs', type='warning')
             return
-        text = foot_file(foot)
-        if self._out is not None:
-            try:
-                path = _write_new(self._out, text)
-            except OSError as error:
-                self._ui.notify(
-                    f'{self._out}: cannot be written: {error.strerror}', type='negative'
-                )
-                return
-            self._ui.notify(f'written: {path}')
-        self._ui.download.content(text, 'my_foot.yaml')
-
-    async def _picture(self) -> None:
-        """Download the drawings of the present inputs."""
-        found = await asyncio.to_thread(explore, self._inputs)
-        self._ui.download.content(explore_drawings.picture(found), 'foot.svg')
+        self._ui.download.content(foot_file(foot), 'my_foot.yaml')
 
 
 def _si(field: Field, number: float | None) -> float | None:
@@ -362,16 +341,3 @@ def answer(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
         ]
         parts.append('</dl></div>')
     return found, figures, ''.join(parts)
-
-
-def _write_new(path: pathlib.Path, text: str) -> pathlib.Path:
-    """Write a new file, with a number behind its name where that is taken; return its path."""
-    number, free = 1, path
-    while True:
-        try:
-            with free.open('x', encoding='utf-8') as stream:
-                stream.write(text)
-            return free
-        except FileExistsError:
-            number += 1
-            free = path.with_name(f'{path.stem}_{number}{path.suffix}')

@@ -77,7 +77,7 @@ _PAGE = """<!DOCTYPE html>
 <head>
 <meta charset="utf-8">
 <meta http-equiv="Content-Security-Policy"
-content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
 <style>
@@ -100,20 +100,7 @@ th, td {{ text-align: left; vertical-align: top; padding: 0.2em 0.8em 0.2em 0;
 tbody td:first-child {{ white-space: nowrap; }}
 .number {{ text-align: right; font-variant-numeric: tabular-nums; }}
 td.number {{ white-space: nowrap; }}
-.walk {{ border: 1px solid #ccc; padding: 0.6em; }}
-.walk td:last-child:not(.number) {{ min-width: 0; }}
-.walk canvas {{ display: block; width: 100%; margin-bottom: 0.5em; background: #fff; }}
-#walk-near {{ border: 1px solid #e2e2e2; }}
-.walk .controls {{ display: flex; flex-wrap: wrap; gap: 0.6em; align-items: center; }}
-.walk .controls input {{ flex: 1 1 14em; min-width: 8em; }}
-.walk .controls button {{ font: inherit; min-width: 5em; }}
-.walk .controls select {{ font: inherit; }}
-.walk output {{ min-width: 11em; font-variant-numeric: tabular-nums; }}
-.legend {{ display: flex; flex-wrap: wrap; gap: 0.2em 1.2em; list-style: none; padding: 0;
-          margin: 0.6em 0; font-size: 0.92em; }}
-.legend svg {{ width: 1.1em; height: 1.1em; vertical-align: -0.2em; }}
 @media print {{
-  .walk {{ display: none; }}
   body {{ font-size: 10pt; margin: 0; max-width: none; }}
   h2, h3 {{ break-after: avoid; }}
 }}

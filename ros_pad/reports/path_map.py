@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import matplotlib
@@ -181,9 +182,23 @@ def picture(view: View) -> Drawn:
         f"Map of the body's path with {len(view.stances)} footprints, {domes} of them of domes, "
         'over wet and dry ground',
         'To scale; a long path is folded into rows. A footprint is where a foot touched down; the '
-        'line from it is its slip path until it lifted off.'
-        + ('' if view.trial.floor is not None else ' The true wet ground is unknown.'),
+        'line from it is its slip path until it lifted off.' + ''.join(_missing(view)),
     )
+
+
+def _missing(view: View) -> Iterator[str]:
+    """Yield sentences on what the map cannot show, each after a space."""
+    trial = view.trial
+    if trial.floor is None:
+        yield ' The true wet ground is unknown.'
+    if not np.isfinite(trial.body).all(axis=1).any():
+        yield ' The pose of the body is not on record.'
+    if not np.isfinite(trial.force[:, :, 2]).any():
+        yield ' No forces are on record: whether a foot stands is unknown.'
+    unplaced = ~np.isfinite(trial.position[:, :, :2]).any(axis=(0, 2))
+    if unplaced.any():
+        legs = ', '.join(str(leg) for leg, gone in zip(trial.legs, unplaced, strict=True) if gone)
+        yield f' Leg {legs}: no position is on record.'
 
 
 __all__ = ['draw', 'handles', 'height', 'panel', 'picture', 'rows_of']

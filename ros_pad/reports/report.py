@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a trial: one HTML file with its figures, and a player of the walk."""
+"""The report of a trial: one HTML file with its figures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from ros_pad.configuration import refuse
 from ros_pad.estimation import DOUBTS
 from ros_pad.pace import Progress
-from ros_pad.reports import animation, pictures
+from ros_pad.reports import pictures
 from ros_pad.reports.files import save
 from ros_pad.reports.page import heading, page, plain_table, section, table, warning
 from ros_pad.reports.pictures import POLICY_NAMES
@@ -199,7 +199,7 @@ def _bound(term: dict[str, Any]) -> str:
 
 def _effect(term: dict[str, Any]) -> str:
     """Return the effect of a term, and whether it is above the accuracy of the scene."""
-    if term.get('effect') is None:  # as in bags of versions that did not estimate it
+    if term.get('effect') is None:
         return 'not known'
     note = ', exceeds the accuracy required' if term['exceeds'] else ''
     share = 100.0 * term['effect']
@@ -277,7 +277,6 @@ def write(
     # The comparison of policies stands before the metrics; the other figures follow below.
     parts.append(sections.pop('comparison', ''))
     parts.append('<h2>Metrics</h2>' + _metrics_tables(view))
-    parts.append('<h2>The walk from above</h2>' + animation.element(view))
     parts += sections.values()
     if words := unobservable_shares(trial, view.load_gate):
         parts.append(f'<h2>Where the ground was observable</h2><p>{html.escape(words)}</p>')

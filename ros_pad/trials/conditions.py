@@ -7,9 +7,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ros_pad.errors import ConfigError
-from ros_pad.simulation.scene import Scene
-from ros_pad.trials.label import AMBIENT_PRESSURE, described, marks
+from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.trial import Trial
 
 # Units of the values of a scene and a foot, by name; a value that is not listed has no unit.
@@ -38,13 +36,12 @@ def rows(trial: Trial) -> list[tuple[str, str]]:
     """Return the conditions of a trial: names, and values with units, as text.
 
     The values come from ``settings['conditions']``, which `ros_pad.trials.label.described` made
-    when the trial ran or, without it, from the shipped scene of the same name if that scene agrees
-    with the bag. The first row names the source.
+    when the trial ran.
     """
     settings = trial.settings
     recorded, source = settings.get('conditions'), 'as recorded with the trial'
     if not isinstance(recorded, Mapping):
-        recorded, source = _shipped(trial)
+        recorded, source = {}, 'no scene is on record: only the following conditions are known'
     found = [('conditions', source)]
     if trial.scene:
         found.append(('scene', _scene_words(trial, recorded)))
@@ -102,27 +99,6 @@ def repeated_by(trial: Trial) -> str | None:
     if trial.settings.get('foot'):
         words += ['--foot', str(trial.settings['foot'])]
     return shlex.join(words)
-
-
-def _shipped(trial: Trial) -> tuple[Mapping[str, Any], str]:
-    """Return the values of the shipped scene of a trial, and a text that names their source."""
-    if not trial.scene:
-        return {}, 'no scene is on record: only the following conditions are known'
-    try:
-        scene = Scene.load(trial.scene)
-    except ConfigError:
-        return {}, 'only the name of the scene is on record'
-    recorded = trial.settings
-    known = marks(scene).items()
-    if any(name in recorded and recorded[name] != each for name, each in known):
-        return {}, 'only the name of the scene is on record; the shipped scene has changed since'
-    values = described(scene)
-    # The command line may have set the cycles.
-    del values['cycles']
-    return (
-        values,
-        'of the shipped scene of this name, which agrees with the settings in the bag',
-    )
 
 
 def _scene_words(trial: Trial, values: Mapping[str, Any]) -> str:

@@ -12,13 +12,13 @@ import pytest
 
 from ros_pad import cli
 from ros_pad.commands import study
+from ros_pad.commands.chart import CHARTS
 from studies.__main__ import STUDIES
 
 PACKAGE = pathlib.Path(cli.__file__).resolve().parent
 DOORS = (
     ('chart', 'contact'),
-    ('chart', 'all'),
-    ('report', '--thesis', '--only', '30'),
+    ('report', '--thesis'),
     ('run', 'bench_press'),
 )
 
@@ -38,31 +38,17 @@ def runs(monkeypatch):
 
 
 def test_charts_are_studies(runs, tmp_path):
+    assert set(CHARTS) <= set(STUDIES)
     assert cli.main(['chart', 'walk', '--out', str(tmp_path), '--json']) == 0
     assert runs == [['walk', '--out', str(tmp_path), '--json']]
 
 
-def test_all_charts_are_in_one_folder_and_one_list(runs, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(['chart', 'all']) == 0
-    assert len(runs) == 6
-    assert all(words[0] in STUDIES for words in runs)
-    (folder,) = {words[2] for words in runs}
-    for name, *_ in runs:
-        (tmp_path / folder / f'{name}.json').write_text(json.dumps({'rows': [{'study': name}]}))
-    assert cli.main(['chart', 'all', '--json', '--out', folder]) == 0
-    rows = json.loads(capsys.readouterr().out)
-    assert [row['study'] for row in rows] == [words[0] for words in runs[:6]]
-
-
 def test_the_page_of_the_thesis_is_a_study(runs):
-    assert cli.main(['report', '--thesis', '--only', '14', '30', '--out', 'page.html']) == 0
-    assert runs == [['thesis', '--only', '14', '30', '--out', 'page.html']]
+    assert cli.main(['report', '--thesis', '--out', 'page.html']) == 0
+    assert runs == [['thesis', '--out', 'page.html']]
 
 
-@pytest.mark.parametrize(
-    'words', [['--only', '14'], ['--thesis', 'bag'], [], ['nowhere']], ids=' '.join
-)
+@pytest.mark.parametrize('words', [['--thesis', 'bag'], [], ['nowhere']], ids=' '.join)
 def test_a_report_of_nothing_is_refused(words, runs, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.main(['report', *words]) == 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Completions that shells receive, by argcomplete's protocol and in bash itself."""
+"""Completions that shells receive, by argcomplete's protocol."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ import json
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 
 import pytest
 
-from ros_pad import cli, configuration
-from ros_pad.commands import completion
-from ros_pad.control import POLICIES
+from ros_pad import cli
 
 pytest.importorskip('argcomplete')
 
@@ -87,12 +84,13 @@ def test_commands(here: pathlib.Path):
     [
         ('pad scenes --j', ['--json']),
         ('pad contact --pad ', ['large', 'small']),
-        ('pad contact --force ', []),  # a number is needed: no file is offered
+        ('pad run my_f', ['my_foot.yaml']),
+        ('pad doctor --robot my_r', ['my_robot.urdf']),
         ('pad contact --foot large1', ['large19']),
         ('pad design --material dragon_skin_3', ['dragon_skin_30']),
         ('pad sweep leg_wet_dome_4', ['leg_wet_dome_40']),
         ('pad bag ', ['info', 'repair']),
-        ('pad bag info runs/walk_', ['runs/walk_2/bag']),
+        ('pad bag info runs/walk_', ['runs/walk_2/']),
     ],
 )
 def test_arguments(line: str, expected: list[str], here: pathlib.Path):
@@ -100,73 +98,6 @@ def test_arguments(line: str, expected: list[str], here: pathlib.Path):
     if line.endswith(' '):  # options are offered, too
         found = [word for word in found if not word.startswith('--')]
     assert sorted(found) == expected
-
-
-@pytest.mark.parametrize(
-    ('command', 'argument', 'prefix', 'expected'),
-    [
-        ('bag', 'bag', 'runs/', ['runs/lone.mcap', 'runs/walk/bag', 'runs/walk_2/bag']),
-        ('replay', 'bag', 'runs/walk_', ['runs/walk_2/bag']),
-        ('report', 'path', './runs/walk_', ['./runs/walk_2/bag']),
-        ('report', 'path', 'em', ['empty/']),
-        ('run', 'foot', 'my', ['my_foot.yaml']),
-        ('run', 'scene', '', configuration.names('scenes')),
-        ('sweep', 'scenes', 'hexapod_p', ['hexapod_patches']),
-        ('sweep', 'policy', '', list(POLICIES)),
-        ('sweep', 'policy', 'flat,', [f'flat,{each}' for each in POLICIES if each != 'flat']),
-        ('run', 'seed', '', []),
-        ('doctor', 'robot', '', configuration.names('robots')),
-        ('doctor', 'robot', 'my', ['my_foot.yaml', 'my_robot.urdf']),
-        ('doctor', 'mapping', 'go2', ['go2', 'go2_sport']),
-        ('doctor', 'bag', 'runs/walk_', ['runs/walk_2/bag']),
-        ('doctor', 'imu', '', []),
-    ],
-)
-def test_what_the_parser_does_not_know(
-    command: str,
-    argument: str,
-    prefix: str,
-    expected: list[str],
-    here: pathlib.Path,
-    monkeypatch: pytest.MonkeyPatch,
-):
-    monkeypatch.chdir(here)
-    top = cli.parser(command)
-    completion.attach(top)
-    # argparse has no public name for the arguments of a parser.
-    (commands,) = (each for each in top._actions if each.dest == 'COMMAND' or each.choices)
-    (action,) = (each for each in commands.choices[command]._actions if each.dest == argument)
-    assert sorted(action.completer(prefix=prefix)) == sorted(expected)
-
-
-REGISTER = 'register-python-argcomplete'
-BASH = """
-eval "$(register-python-argcomplete pad)"
-COMP_LINE='pad replay runs/walk_'; COMP_POINT=${#COMP_LINE}; COMP_TYPE=9; COMP_CWORD=2
-COMP_WORDS=(pad replay runs/walk_)
-$(complete -p pad | sed 's/.*-F \\([^ ]*\\).*/\\1/') pad runs/walk_ replay
-printf '%s\\n' "${COMPREPLY[@]}"
-"""
-
-
-def test_bash_completes_a_bag(here: pathlib.Path):
-    scripts = pathlib.Path(sys.executable).parent
-    if not (shutil.which('bash') and (scripts / REGISTER).exists()):
-        pytest.skip(f'needs bash, and {REGISTER} beside {sys.executable}')
-    tool = here / 'bin' / 'pad'
-    tool.parent.mkdir()
-    tool.write_text(f'#!/bin/sh\nexec {sys.executable} -m ros_pad.cli "$@"\n')
-    tool.chmod(0o755)
-    path = os.pathsep.join([str(tool.parent), str(scripts), os.environ['PATH']])
-    child = subprocess.run(
-        ['bash', '-c', BASH],
-        cwd=here,
-        env={**os.environ, 'PATH': path, 'PYTHONPATH': str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert child.stdout.split() == ['runs/walk_2/bag'], child.stderr
 
 
 def test_argcomplete_finds_its_mark_where_the_command_begins():

@@ -91,7 +91,7 @@ def test_seeds_that_make_no_sense_are_refused(text: str):
         (['leg_wet_flat', '--set', 'policy.dwel=1'], ["'policy.dwel'", 'policy.dwell']),
         (
             ['leg_wet_flat', '--workers', '0'],
-            ['workers = 0 is not allowed: a whole number from 1'],
+            ['workers = 0 is not allowed: a whole number of at least 1'],
         ),
     ],
 )

@@ -7,21 +7,12 @@ import math
 import pathlib
 import xml.etree.ElementTree
 
-import numpy as np
 import pytest
 
 from ros_pad import cli
-from ros_pad.contact import (
-    Film,
-    Foot,
-    Material,
-    MeasuredLimit,
-    Pad,
-    force_limit,
-    tangential_resistance,
-)
+from ros_pad.contact import Film, Foot, MeasuredLimit, Pad, force_limit, tangential_resistance
 from ros_pad.reports.explore import FIELDS, STATES, Explored, Field, Inputs, explore, rows
-from ros_pad.reports.explore_drawings import picture
+from ros_pad.reports.explore_drawings import drawings, svg
 from ros_pad.reports.explore_page import foot_file
 from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel, Scene
 from ros_pad.simulation.pneumatics import time_to
@@ -31,6 +22,10 @@ LARGE = Inputs.of(Foot.load('large37'))
 
 def changed(**values: object) -> Explored:
     return explore(dataclasses.replace(LARGE, **values))
+
+
+def picture(found: Explored) -> str:
+    return f'<div>{"".join(map(svg, drawings(found).values()))}</div>'
 
 
 def texts(found: Explored) -> dict[str, str]:
@@ -51,7 +46,7 @@ def test_the_numbers_are_those_of_pad_contact(capsys: pytest.CaptureFixture[str]
     assert found.pressed.contact_radius == said['pressed']['contact_radius_m']
     assert found.ring.height == said['meniscus']['height_m']
     assert found.limits == said['force_limit_n']
-    assert found.limit.value == 37 * said['force_limit_n']['measured']
+    assert found.limit == 37 * said['force_limit_n']['measured']
 
 
 @pytest.mark.parametrize('roughness', [0.0, 2e-6])
@@ -67,28 +62,9 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
             on_domes = foot.dome_load(13.0, pressure)
             films = film.drain(on_domes, 13.0 - on_domes, pressure, 0.3)
         value = tangential_resistance(foot, 13.0, pressure, *films)
-        assert found.grip[state].value == pytest.approx(value, rel=1e-12)
-        low, high = found.grip[state][1:]
-        assert low < value < high
+        assert found.grip[state] == pytest.approx(value, rel=1e-12)
     above = next(each for each in found.remarks if each.name == 'load')
     assert 'above the force limit' in above.text and not above.error
-
-
-def test_bands_hold_each_constant_halved_and_doubled():
-    own = explore(LARGE).grip
-    assumed = 'friction shear_strength conforming_pressure boundary_friction critical_film'
-    found = {state: [own[state].value] for state in STATES}
-    for name in (*assumed.split(), 'film_exponent'):
-        for factor in (0.5, 2.0):
-            wrong = {name: factor * getattr(LARGE.foot, name)}
-            foot = dataclasses.replace(LARGE.foot, **wrong)
-            for state, span in changed(foot=foot).grip.items():
-                found[state].append(span.value)
-    for state in ('flat, dry', 'flat, wet', 'dome, dry'):
-        assert own[state][1:] == pytest.approx((min(found[state]), max(found[state])), rel=1e-12)
-    # A wet dome without any dry contact has boundary friction alone.
-    assert own['dome, wet'].low == pytest.approx(0.12 * LARGE.load, rel=1e-3)
-    assert own['dome, wet'].high == pytest.approx(max(found['dome, wet']), rel=1e-12)
 
 
 def test_film_time_and_hose_are_those_of_the_scene():
@@ -96,21 +72,6 @@ def test_film_time_and_hose_are_those_of_the_scene():
     assert scene.floor.film_thickness == LARGE.film
     assert scene.regulator == {'hose_diameter': LARGE.bore, 'hose_length': LARGE.hose}
     assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE.stand
-
-
-def test_the_limit_over_the_factor_of_a_material_is_that_of_each_factor():
-    material = dataclasses.replace(Material.load('dragon_skin_10'), factor_range=(1.0, 1.4))
-    pad = Pad.of(material, 1.5e-3, 0.4e-3)
-    foot = dataclasses.replace(LARGE.foot, pad=pad, limit='wall', ceiling=46e3)
-    found = explore(dataclasses.replace(Inputs.of(foot), pressure=45e3, load=1.0))
-    limits = []
-    for factor in np.linspace(1.0, 1.4, 9):
-        pad = Pad.of(material.times(factor), 1.5e-3, 0.4e-3)
-        limits.append(37 * force_limit(pad, 45e3, 'wall'))
-    others = [37 * each for each in found.limits.values()]
-    assert found.limit.low == pytest.approx(min(limits), rel=1e-9)
-    assert found.limit.high == max(others)
-    assert 0.0 < min(limits) < min(others)  # or this would test nothing
 
 
 def test_a_measured_limit_stays_with_its_pad():

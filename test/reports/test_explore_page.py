@@ -11,7 +11,6 @@ import threading
 import urllib.error
 import urllib.parse
 import urllib.request
-import xml.etree.ElementTree
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -26,20 +25,18 @@ pytest.importorskip('nicegui', reason="the extra is missing: pip install 'ros_pa
 
 
 @pytest.fixture(scope='module')
-def page(tmp_path_factory: pytest.TempPathFactory):
-    """Yield a page of large37 with the folder of --out and the addresses that it has asked for."""
+def page():
+    """Yield a page of large37 with the addresses that it has asked for."""
     pytest.importorskip('playwright')
     if study.CHROMIUM is None:
         pytest.skip('no Chromium is installed')
-    folder = tmp_path_factory.mktemp('explore')
-    out = str(folder / 'mine.yaml')
-    with study.served('large37', '--out', out) as (address, _), study.browser() as chromium:
+    with study.served('large37') as (address, _), study.browser() as chromium:
         context = chromium.new_context(accept_downloads=True)
         asked: list[str] = []
         context.on('request', lambda request: asked.append(request.url))
         found = study.opened(context, address)
         found.on('websocket', lambda line: asked.append(line.url))
-        found.folder, found.asked = folder, asked
+        found.asked = asked
         yield found
 
 
@@ -127,11 +124,6 @@ def test_the_foot_file_walks(page, tmp_path: pathlib.Path, capsys):
     options = ('--no-ros', '--no-compare', '--json', '--out', str(tmp_path / 'walk'))
     assert cli.main(['run', *walk, *options]) == 0
     assert json.loads(capsys.readouterr().out)
-    with page.expect_download():
-        page.get_by_role('button', name='Foot file').click()
-    written = sorted(each.name for each in page.folder.iterdir())
-    assert written == ['mine.yaml', 'mine_2.yaml']
-    assert (page.folder / 'mine.yaml').read_text() == path.read_text()
 
 
 def test_the_foot_file_is_of_the_last_change_though_its_answer_is_not_there_yet(page):
@@ -143,15 +135,6 @@ def test_the_foot_file_is_of_the_last_change_though_its_answer_is_not_there_yet(
             .find(each => each.innerText === 'Foot file').click());
         }""")
     assert '\npads: 43\n' in loading.value.path().read_text(encoding='utf-8')
-
-
-def test_the_picture_is_one_file(page, tmp_path: pathlib.Path):
-    with page.expect_download() as loading:
-        page.get_by_role('button', name='Picture').click()
-    loading.value.save_as(tmp_path / 'foot.svg')
-    picture = (tmp_path / 'foot.svg').read_text(encoding='utf-8')
-    assert xml.etree.ElementTree.fromstring(picture).tag.endswith('svg')
-    assert 'Force limit over pressure' in picture
 
 
 def test_nothing_is_loaded_from_elsewhere(page):
@@ -264,15 +247,12 @@ def test_without_the_extra_the_remedy_is_printed(monkeypatch, capsys):
     assert "pip install 'ros_pad[explore]'" in said.err
 
 
-def test_what_cannot_be_served_is_refused(tmp_path: pathlib.Path, capsys):
-    (tmp_path / 'foot.yaml').touch()
+def test_what_cannot_be_served_is_refused(capsys):
     with socket.create_server(('127.0.0.1', 0)) as taken:
         port = str(taken.getsockname()[1])
         for words, message in (
             (['--port', port], f'--port {port}: Address already in use'),
             (['--port', '0'], '--port = 0 is not allowed: a whole number from 1 to 65535'),
-            (['--out', str(tmp_path / 'foot.yaml')], 'exists already'),
-            (['--out', 'foot.txt'], 'ends in .yaml'),
             (['no_foot'], "no foot named 'no_foot'"),
         ):
             assert cli.main(['explore', '--no-browser', *words]) == 2

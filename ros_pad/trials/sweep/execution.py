@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import ros_pad
-from ros_pad.errors import InvalidInput, PadError
+from ros_pad.configuration import integer
+from ros_pad.errors import PadError
 from ros_pad.pace import Progress
 from ros_pad.trials import loop
 from ros_pad.trials.sweep.plan import Job, Row, Sweep
@@ -84,10 +85,8 @@ def run(
         When Dask is missing, its cluster does not answer or has another version of ros_pad, or
         another sweep is running in the folder.
     """
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise InvalidInput(
-            f'workers = {workers!r} is not allowed: a whole number from 1 is needed'
-        )
+    if workers is not None:
+        integer('workers', workers, 1)
     jobs = {job.key: job for job in sweep.jobs()}
     with ExitStack() as stack:
         if scheduler is None:

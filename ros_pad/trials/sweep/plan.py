@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from ros_pad import configuration
-from ros_pad.configuration import Table, choice, instance
+from ros_pad.configuration import Table, choice, instance, integer
 from ros_pad.control import POLICIES, policy_named
 from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
@@ -141,12 +141,7 @@ class Sweep:
         for policy in self.policies:
             choice('policy', policy, POLICIES)
         for seed in self.seeds:
-            whole = isinstance(seed, int) and not isinstance(seed, bool)
-            if not whole or not 0 <= seed <= LARGEST_SEED:
-                raise InvalidInput(
-                    f'seed = {seed!r} is not allowed: a whole number from 0 to'
-                    f' {LARGEST_SEED} is needed'
-                )
+            integer('seed', seed, 0, LARGEST_SEED)
         for name in self.parameters:
             _check_name(name)
 
