@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from ros_pad.configuration import quantity
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array, cross
+from ros_pad.robots.rotation import Array, cross, skew
 from ros_pad.sensing.estimator import DAMPING, LONGEST_STEP, WEIGHT
 
 Flags = npt.NDArray[np.bool_]
@@ -37,6 +37,7 @@ WINDOW = 0.06  # s, over which feet are taken to stand still
 FEWEST = 30  # windows in which pairs of feet stand while the robot moves
 SUNK = 0.05  # m, below the floor
 SURE = 6.0  # standard deviations
+_FLIPS = [np.diag(1.0 - 2.0 * row) for row in np.eye(3)]
 
 
 Progress: TypeAlias = Callable[[float], None]
@@ -212,15 +213,6 @@ class Recording:
         found = _pairs(self, self.stands, self.span)
         moves = ~self.rests[found.first]
         return _Pairs(found.first[moves], found.arm[moves], found.drift[moves])
-
-    def with_gyro(self, gyro: Array) -> Recording:
-        """Return the recording with other readings of the gyro."""
-        other = replace(self, gyro=gyro)
-        # What does not depend on the gyro is not computed again.
-        for name in ('speeds', 'kinematics', 'ground_forces', 'stands', 'rests', 'pairs', 'pull'):
-            if name in vars(self):
-                vars(other)[name] = vars(self)[name]
-        return other
 
     def reversed(self, joint: int) -> Recording:
         """Return the recording with one joint the other way round."""
@@ -402,10 +394,11 @@ def _mean(values: Array, span: int) -> Array:
     return (sums[span:] - sums[:-span] + 0.5 * (values[:-span] - values[span:])) / span
 
 
-def _without_bias(recording: Recording) -> Array:
-    """Return the angular velocity without the bias that the gyro shows at rest."""
-    rests = recording.rests
-    return recording.rate - (recording.rate[rests].mean(0) if rests.any() else 0.0)
+def _rate(recording: Recording, late: float = 0.0) -> Array:
+    """Return the angular velocity, ``late`` s ago, without the bias that it shows at rest."""
+    rate, rests = recording.rate, recording.rests
+    bias = rate[rests].mean(0) if rests.any() else 0.0
+    return (recording.at_joints(recording.gyro, late) if late else rate) - bias
 
 
 def _better(before: Array, after: Array) -> float:
@@ -416,89 +409,103 @@ def _better(before: Array, after: Array) -> float:
     return float(gain.mean()) / max(deviation, 1e-12)
 
 
-class _Guess(NamedTuple):
-    """Something that may be wrong, and the recording without it."""
-
-    finding: Finding
-    simple: int  # number of things that it takes to be wrong
-    mended: Recording
-
-
-def mend(recording: Recording, progress: Progress = _unseen) -> tuple[list[Finding], Recording]:
+def turned(recording: Recording, progress: Progress = _unseen) -> tuple[list[Finding], Recording]:
     """Check joints and gyro against each other: feet that stand do not move against each other.
 
-    Of all single faults (a joint reversed, a gyro turned, negated or in degrees), the one is
-    found with which feet stand still best; then another one, until no other helps.
+    Joints are reversed if feet then stand still, with any axes and unit of the gyro; with these
+    joints, least squares of what feet and gyro show of the rotation give its axes and unit.
 
     Returns
     -------
     findings : list of Finding
-    mended : Recording
-        The recording without these faults.
+    recording : Recording
+        With the joints as they should be.
     """
     found: list[Finding] = []
-    while len(found) < len(recording.robot.joint_names):
-        # How many faults there are is not known before: each takes half of the share that is left.
-        guess = _first_guess(recording, progress, 0.5 ** len(found))
-        if guess is None or guess.finding in found:
+    names = recording.robot.joint_names
+    while len(recording.pairs.first) >= FEWEST and len(found) < len(names):
+        others = []
+        for joint in range(len(names)):
+            others.append(recording.reversed(joint))
+            # How many are reversed is not known before: each takes half of the share that is left.
+            progress(1.0 - 0.5 ** len(found) * (1.0 - 0.5 * (joint + 1) / len(names)))
+        _, before = _fit(recording)
+        errors = [_fit(each)[1] if len(each.pairs.first) else before for each in others]
+        best = int(np.argmin([each.mean() for each in errors]))
+        finding = _reversed(names[best])
+        if finding in found or not _explains(before, errors[best]):
             break
-        found.append(guess.finding)
-        recording = guess.mended
+        found.append(finding)
+        recording = others[best]
     progress(1.0)
-    return found, recording
+    return [*found, *_gyro(recording)], recording
 
 
-def _first_guess(recording: Recording, progress: Progress, left: float) -> _Guess | None:
-    """Return the simplest fault that explains motion of standing feet best, or None."""
-    before = _errors(recording)
-    guesses: list[tuple[_Guess, Array]] = []
-    if len(before) < FEWEST:
-        return None
-    tried = [*_gyro_guesses(recording), *_joint_guesses(recording)]
-    for number, guess in enumerate(tried, 1):
-        after = _errors(guess.mended)
-        sure = _better(before, after)
-        if sure > SURE or (sure > 0.5 * SURE and after.mean() < 0.7 * before.mean()):
-            guesses.append((guess, after))
-        progress(1.0 - left * (1.0 - 0.5 * number / len(tried)))
-    if not guesses:
-        return None
-    _, best = min(guesses, key=lambda each: float(each[1].mean()))
-    alike = [each for each in guesses if _better(each[1], best) < 3.0]
-    return min(alike, key=lambda each: (each[0].simple, float(each[1].mean())))[0]
+def _reversed(name: str) -> Finding:
+    advice = f'reversed: [{name}] in the mapping, or the axis in the robot file'
+    return _problem(f'joint {name}', 'is reversed: its foot moves as if it slipped', advice)
 
 
-def _errors(recording: Recording) -> Array:
-    """Return how fast pairs of standing feet move against each other in windows, m/s."""
-    span = recording.span
+def _explains(before: Array, after: Array) -> bool:
+    """Return whether errors are so much smaller that what was wrong is known."""
+    if len(before) != len(after):
+        return bool(after.mean() < 0.5 * before.mean())
+    sure = _better(before, after)
+    return sure > SURE or (sure > 0.5 * SURE and after.mean() < 0.7 * before.mean())
+
+
+def _fit(recording: Recording) -> tuple[Array, Array]:
+    """Return the matrix from the gyro's rate to that of the legs, and the errors that are left."""
     pairs = recording.pairs
-    rate = _mean(_without_bias(recording), span)[pairs.first]
+    rate = _mean(_rate(recording), recording.span)[pairs.first]
+    lines = skew(pairs.arm)[..., None] * rate[:, None, None]
+    lines = lines.reshape(-1, 9)
+    matrix = np.linalg.lstsq(lines, pairs.drift.ravel(), rcond=None)[0]
+    rest = pairs.drift - (lines @ matrix).reshape(-1, 3)
+    return matrix.reshape(3, 3), np.asarray(np.linalg.norm(rest, axis=1))
+
+
+def _errors(recording: Recording, turn: Array | None = None, late: float = 0.0) -> Array:
+    """Return how fast pairs of standing feet move against each other in windows, m/s.
+
+    The rate of the gyro is turned by a matrix, and taken from ``late`` s before.
+    """
+    pairs = recording.pairs
+    rate = _mean(_rate(recording, late), recording.span)[pairs.first]
+    rate = rate if turn is None else rate @ turn.T
     return np.asarray(np.linalg.norm(pairs.drift + cross(rate, pairs.arm), axis=1))
 
 
-def _gyro_guesses(recording: Recording) -> list[_Guess]:
+def _along(matrix: Array) -> Array:
+    """Return the axes, with their signs, that a matrix of least squares shows; own if unclear."""
+    size, rows = float(np.abs(matrix).max()), np.arange(len(matrix))
+    known = np.where(np.abs(matrix) > 0.3 * size, matrix, 0.0) + 0.2 * size * np.eye(len(rows))
+    orders = [np.array(order) for order in itertools.permutations(rows)]
+    order = max(orders, key=lambda each: float(np.abs(known[rows, each]).sum()))
+    turn = np.zeros_like(matrix)
+    turn[rows, order] = np.where(known[rows, order] < 0.0, -1.0, 1.0)
+    return turn
+
+
+def _gyro(recording: Recording) -> list[Finding]:
+    """Return findings about axes and unit of the gyro."""
+    if len(recording.pairs.first) < FEWEST:
+        return []
+    matrix, _ = _fit(recording)
+    turn = _along(matrix)
+    scale = math.pi / 180.0 if np.abs(matrix).max() < 0.1 else 1.0
+    if not _explains(_errors(recording), _errors(recording, scale * turn)):
+        return []
     found = []
-
-    def guess(text: str, advice: str, turn: Array, simple: int) -> None:
-        to_base = recording.robot.imu[:3, :3]
-        other = recording.with_gyro(recording.gyro @ (to_base.T @ turn @ to_base).T)
-        found.append(_Guess(_problem('gyro', text, advice), simple, other))
-
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            # Rows: the axis of the base, and the axis of the gyro that has its rate.
-            turn = np.eye(3)[list(order)] * np.array(signs)[:, None]
-            wrong = [axis for axis in range(3) if turn[axis, axis] != 1.0]
-            if wrong:
-                rows = [f'{"xyz"[row]} is on {_axis(turn[row])}' for row in wrong]
-                guess(
-                    f'its axes do not fit the legs: rotation about {", about ".join(rows)}',
-                    _turn_back(recording, turn),
-                    turn,
-                    len(wrong),
-                )
-    scale = math.pi / 180.0
-    guess('is in degrees per second', f'scale: {scale:.10g} in the mapping', scale * np.eye(3), 1)
+    if scale != 1.0:
+        advice = f'scale: {scale:.10g} in the mapping'
+        found.append(_problem('gyro', 'is in degrees per second', advice))
+    wrong = [
+        f'{"xyz"[axis]} is on {_axis(turn[axis])}' for axis in range(3) if turn[axis, axis] < 1
+    ]
+    if wrong:
+        text = f'its axes do not fit the legs: rotation about {", about ".join(wrong)}'
+        found.append(_problem('gyro', text, _turn_back(recording, turn)))
     return found
 
 
@@ -510,39 +517,13 @@ def _turn_back(recording: Recording, turn: Array) -> str:
     return f'turn the IMU in the robot file: what it calls x, y, z of the base is {axes}'
 
 
-def _joint_guesses(recording: Recording) -> list[_Guess]:
-    return [
-        _Guess(_reversed(name), 1, recording.reversed(joint))
-        for joint, name in enumerate(recording.robot.joint_names)
-    ]
-
-
-def _reversed(name: str) -> Finding:
-    advice = f'reversed: [{name}] in the mapping, or the axis in the robot file'
-    return _problem(f'joint {name}', 'is reversed: its foot moves as if it slipped', advice)
-
-
-def levels(recording: Recording) -> tuple[list[Finding], Recording]:
-    """Check at rest that the feet are in one plane below the body.
-
-    Returns
-    -------
-    findings : list of Finding
-    mended : Recording
-        The recording with the one joint reversed that brings the feet into a plane, if there is
-        such a joint.
-    """
+def levels(recording: Recording) -> list[Finding]:
+    """Check at rest that the feet are in one plane below the body."""
     if not recording.rests.any():
-        return [], recording
-    q = recording.positions[recording.rests].mean(0)
-    off = _off_plane(recording, q)
+        return []
+    off = _off_plane(recording, recording.positions[recording.rests].mean(0))
     if off.max() < UNEVEN:
-        return [], recording
-    signs = 1.0 - 2.0 * np.eye(len(q))
-    left = [float(_off_plane(recording, q * each).max()) for each in signs]
-    best = int(np.argmin(left))
-    if left[best] < 0.5 * UNEVEN and sorted(left)[1] > 2.0 * left[best]:
-        return [_reversed(recording.robot.joint_names[best])], recording.reversed(best)
+        return []
     leg = recording.robot.legs[int(off.argmax())]
     text = (
         f'at rest foot {leg} is {off.max():.2g} m off the plane of the others, or the plane leans'
@@ -550,7 +531,7 @@ def levels(recording: Recording) -> tuple[list[Finding], Recording]:
     advice = (
         'on a flat floor: look for a reversed joint, a wrong zero, a wrong foot link or length'
     )
-    return [_problem('feet', text, advice)], recording
+    return [_problem('feet', text, advice)]
 
 
 def _off_plane(recording: Recording, q: Array) -> Array:
@@ -569,18 +550,12 @@ def _off_plane(recording: Recording, q: Array) -> Array:
 
 def delay(recording: Recording) -> list[Finding]:
     """Check that IMU and joints have the same time: when the gyro fits the legs best."""
-    span, pairs = recording.span, recording.pairs
-    if len(pairs.first) < FEWEST:
+    if len(recording.pairs.first) < FEWEST:
         return []
-    bias = recording.rate - _without_bias(recording)
-
-    def errors(late: float) -> Array:
-        rate = _mean(recording.at_joints(recording.gyro, late) - bias, span)[pairs.first]
-        return np.asarray(np.linalg.norm(pairs.drift + cross(rate, pairs.arm), axis=1))
-
     tried = np.arange(-LONGEST_DELAY, LONGEST_DELAY + 5e-4, 1e-3)
-    best = float(tried[int(np.argmin([errors(late).mean() for late in tried]))])
-    if abs(best) <= DELAY or _better(errors(0.0), errors(best)) < 0.5 * SURE:
+    best = float(min(tried, key=lambda late: float(_errors(recording, late=late).mean())))
+    gain = _better(_errors(recording), _errors(recording, late=best))
+    if abs(best) <= DELAY or gain < 0.5 * SURE:
         return []
     text = (
         f'stamps are {1e3 * abs(best):.0f} ms {"later" if best > 0.0 else "earlier"} than the IMU'
@@ -679,34 +654,26 @@ def horizontal(recording: Recording) -> list[Finding]:
 
 def _turned(recording: Recording, forces: Array) -> Array | None:
     """Return how the total force must be turned about z to fit the accelerometer, or None."""
-    eye = np.eye(2)
-    plain = _push_errors(recording, forces, eye)
-    if len(plain) < FEWEST:
+    total, wanted = _pushes(recording, forces)
+    if len(total) < FEWEST:
         return None
-    turns = [
-        row * np.array(signs)[:, None]
-        for row in (eye, eye[::-1])
-        for signs in itertools.product((1.0, -1.0), repeat=2)
-    ]
-    errors = [_push_errors(recording, forces, turn) for turn in turns]
-    best = min(range(len(turns)), key=lambda index: float(errors[index].mean()))
-    if errors[best].mean() > 0.7 * plain.mean() or _better(plain, errors[best]) < SURE:
-        return None
-    found = np.eye(3)
-    found[:2, :2] = turns[best]
-    return found
+    turn = np.eye(3)
+    turn[:2, :2] = _along(np.linalg.lstsq(total, wanted, rcond=None)[0].T)
+    plain, after = (_sizes(total @ each.T - wanted) for each in (np.eye(2), turn[:2, :2]))
+    return turn if after.mean() < 0.7 * plain.mean() and _better(plain, after) > SURE else None
 
 
-def _push_errors(recording: Recording, found: Array, turn: Array) -> Array:
-    """Return how much the total force, turned, differs from mass times specific force, N."""
+def _pushes(recording: Recording, forces: Array) -> tuple[Array, Array]:
+    """Return the total force along the ground, and mass times specific force, (k, 2), N."""
     span = 3 * recording.span
     moves = np.flatnonzero(~recording.rests[: len(recording.rests) - span])[:: max(1, span // 3)]
-    total = _mean(found.sum(1), span)[moves, :2] @ turn.T
+    total = _mean(forces.sum(1), span)[moves, :2]
     wanted = recording.robot.mass * _mean(recording.pull, span)[moves, :2]
-    if not len(moves):
-        return np.zeros(0)
-    errors = total - total.mean(0) - wanted + wanted.mean(0)
-    return np.asarray(np.linalg.norm(errors, axis=1))
+    return (total - total.mean(0), wanted - wanted.mean(0)) if len(moves) else (total, wanted)
+
+
+def _sizes(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def swings(recording: Recording) -> list[Finding]:
@@ -740,36 +707,24 @@ def unjudged(recording: Recording, progress: Progress = _unseen) -> list[str]:
         sure = _better(after, before)
         return sure < 0.5 * SURE or (sure < SURE and before.mean() > 0.7 * after.mean())
 
-    flips = {
-        f'gyro about {axis}': recording.with_gyro(recording.gyro @ flip)
-        for axis, flip in zip('xyz', _flips(recording), strict=True)
-    }
-    others = {each.finding.what: each.mended for each in _joint_guesses(recording)}
-    found = []
-    for number, (name, other) in enumerate((flips | others).items(), 1):
-        if unclear(_errors(other)):
-            found.append(name)
-        progress(number / (len(flips) + len(others)))
-    late = replace(recording, imu_time=recording.imu_time + 0.01)
-    vars(late).update(pairs=recording.pairs, rests=recording.rests)
-    if unclear(_errors(late)):
-        found.append('delay between IMU and joints')
+    others = {f'gyro about {"xyz"[i]}': _errors(recording, flip) for i, flip in enumerate(_FLIPS)}
+    names = recording.robot.joint_names
+    for joint, name in enumerate(names):
+        others[f'joint {name}'] = _errors(recording.reversed(joint))
+        progress((joint + 1) / len(names))
+    others['delay between IMU and joints'] = _errors(recording, late=0.01)
+    found = [name for name, after in others.items() if unclear(after)]
     push = recording.ground_forces
     if push is not None and recording.force_kind == 'vector':
-        before = _push_errors(recording, push, np.eye(2))
-        if unclear(_push_errors(recording, push, -np.eye(2))):
+        total, wanted = _pushes(recording, push)
+        before = _sizes(total - wanted)
+        if unclear(_sizes(total + wanted)):
             found.append('horizontal axes of accelerometer and forces')
     return found
 
 
-def _flips(recording: Recording) -> list[Array]:
-    """Return the matrices that negate the gyro's rate about x, y or z of the base."""
-    to_base = recording.robot.imu[:3, :3]
-    return [to_base.T @ np.diag(1.0 - 2.0 * row) @ to_base for row in np.eye(3)]
-
-
 def examine(recording: Recording, progress: Progress = _unseen) -> list[Finding]:
-    """Run all checks; each fault that is found is mended before the next check.
+    """Run all checks, those of the forces with the joints as they should be.
 
     Parameters
     ----------
@@ -787,9 +742,9 @@ def examine(recording: Recording, progress: Progress = _unseen) -> list[Finding]
     if any(each.status == 'problem' for each in found):
         return found  # without times and angles, nothing else can be judged
     found += [*rates(recording), *gravity(recording), *velocities(recording)]
-    uneven, level = levels(recording)
-    moved, fine = mend(level, progress)
-    found += [*uneven, *moved]
+    moved, fine = turned(recording, progress)
+    uneven = levels(fine)
+    found += [*moved, *uneven]
     if not (uneven or moved):
         found += [*swings(fine), *delay(fine)]
     loads = forces(fine)
