@@ -90,6 +90,34 @@ _MATRIX = [f'covariance[{place}]' for place in range(36)]
 _TWIST = [f'twist.{part}.{axis}' for part in ('linear', 'angular') for axis in 'xyz']
 
 
+class _Samples:
+    """Samples of the feet, sent by control period; in simulated time one for each moment."""
+
+    def __init__(self, send: Callable[[Block], None], legs: int) -> None:
+        self._send, self._legs = send, legs
+        self._pace = Pace(CONTROL_PERIOD_NS)
+        self._rows: dict[int, np.ndarray] = {}  # of the next block, by stamp
+        self._seen = dict.fromkeys(('forces', 'imu', 'joints'), 0)  # last stamps, ns
+        self._sent_ns = 0
+
+    def settle(self, source: str, stamp_ns: int, simulated: bool) -> None:
+        """Note how far a source has come. A simulated moment without an estimate has none."""
+        self._seen[source] = stamp_ns
+        moment_ns = min(self._seen.values())
+        if simulated and moment_ns not in self._rows:
+            self.add(moment_ns, SAMPLE.rows(self._legs))
+
+    def add(self, stamp_ns: int, rows: np.ndarray) -> None:
+        """Send what was collected, if the estimates of the feet are due at this moment."""
+        if stamp_ns <= self._sent_ns < stamp_ns + SET_BACK_NS:
+            return  # the moment has been sent without it
+        self._rows[stamp_ns] = rows
+        if self._pace.due(stamp_ns):
+            stamps = sorted(self._rows)
+            self._send(Block(np.array(stamps), np.array([self._rows[n] for n in stamps])))
+            self._rows, self._sent_ns = {}, stamp_ns
+
+
 class BodyEstimatorNode(Node):
     """Estimate the motion of body and feet; parameters are in :data:`PARAMETERS`.
 
@@ -111,10 +139,9 @@ class BodyEstimatorNode(Node):
         )
         values = declare(self, PARAMETERS)
         self._robot = robot = self._load(values)
-        self._mapping = self._mapped(values)
-        if self._mapping:
-            values['force_axes'] = self._mapping.force_axes
-        self._base: str = values['base_frame']
+        mapping = self._mapped(values)
+        if mapping:
+            values['force_axes'] = mapping.force_axes
         self._force_source = ''  # as reported last
         self._rate = np.zeros(3)  # last angular velocity, IMU axes, rad/s
         self.messages = Messages(self)
@@ -128,16 +155,13 @@ class BodyEstimatorNode(Node):
         )
         self._gyro_noise: float = values['gyro_noise']
         self._order = JointOrder(robot)
-        self._pace = Pace(CONTROL_PERIOD_NS)
-        self._records: dict[int, np.ndarray] = {}  # rows of the next block, by stamp
-        self._seen = dict.fromkeys(('forces', 'imu', 'joints'), 0)  # last stamps, ns
-        self._sent_ns = 0
-        self._send = self.messages.record_output(topics.SAMPLE, values['legs'])
-        self._send_odom = self._odometry()
+        send = self.messages.record_output(topics.SAMPLE, values['legs'])
+        self._samples = _Samples(send, len(values['legs']))
+        self._send_odom = self._odometry(values['base_frame'])
         self._doubts = self.messages.output(topics.BODY_DOUBT)
-        self._send_tf = self._transforms() if values['publish_tf'] else None
-        if self._mapping:
-            self._follow(self._mapping)
+        self._send_tf = self._transforms(values['base_frame']) if values['publish_tf'] else None
+        if mapping:
+            self._follow(mapping)
         else:
             self._subscribe(values['legs'])
         self._diagnostics = Diagnostics(self, self.messages)
@@ -200,15 +224,15 @@ class BodyEstimatorNode(Node):
 
         return callback
 
-    def _odometry(self) -> Callable[..., None]:
+    def _odometry(self, base: str) -> Callable[..., None]:
         """Return a function that publishes odom."""
         pose, twist = ([f'{part}.{place}' for place in _MATRIX] for part in ('pose', 'twist'))
         paths = [*STAMP, *topics.ODOM.schema.values, *pose]
         paths += [*(f'twist.{each}' for each in _TWIST), *twist]
-        constants = {'child_frame_id': self._base}
+        constants = {'child_frame_id': base}
         return self.messages.sender(topics.ODOM, paths, constants=constants)
 
-    def _transforms(self) -> Callable[[int, BodyEstimate], None]:
+    def _transforms(self, base: str) -> Callable[[int, BodyEstimate], None]:
         """Return a function that publishes the transform from odom to the base."""
         try:
             from tf2_msgs.msg import TFMessage
@@ -220,7 +244,7 @@ class BodyEstimatorNode(Node):
         publisher = self.create_publisher(TFMessage, '/tf', topics.ODOM.publish)
 
         def send(stamp_ns: int, estimate: BodyEstimate) -> None:
-            transform = TransformStamped(child_frame_id=self._base)
+            transform = TransformStamped(child_frame_id=base)
             transform.header.frame_id = topics.ODOM.schema.frame
             set_stamp(transform.header.stamp, stamp_ns)
             place, turn = transform.transform.translation, transform.transform.rotation
@@ -244,7 +268,7 @@ class BodyEstimatorNode(Node):
             for index, force in enumerate(rows):
                 if np.isfinite(force).all():
                     self.stage.force(index, stamp_ns, force)
-        self._settle('forces', block.last_ns)
+        self._samples.settle('forces', block.last_ns, self.messages.simulated)
 
     def _on_imu(
         self, sec: int, nanosec: int, no_gyro: float, no_accelerometer: float, *values: float
@@ -261,7 +285,7 @@ class BodyEstimatorNode(Node):
         if math.isfinite(sum(values)):
             self._rate = np.array(values[:3])
             self.stage.imu(stamp_ns, values[:3], values[3:])
-        self._settle('imu', stamp_ns)
+        self._samples.settle('imu', stamp_ns, self.messages.simulated)
 
     def _on_joints(self, message: JointState) -> None:
         try:
@@ -272,7 +296,7 @@ class BodyEstimatorNode(Node):
         stamp_ns = nanoseconds(message.header.stamp)
         if np.isfinite(values[0]).all():
             self.stage.joints(stamp_ns, *values)
-        self._settle('joints', stamp_ns)
+        self._samples.settle('joints', stamp_ns, self.messages.simulated)
 
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         """Publish an estimate of the body, and collect what it shows of the feet."""
@@ -289,24 +313,7 @@ class BodyEstimatorNode(Node):
         self._send_odom(*values)
         if self._send_tf:
             self._send_tf(stamp_ns, estimate)
-        self._collect(stamp_ns, sample_of(estimate))
-
-    def _settle(self, source: str, stamp_ns: int) -> None:
-        """Note how far a source has come. A simulated moment without an estimate has none."""
-        self._seen[source] = stamp_ns
-        moment_ns = min(self._seen.values())
-        if self.messages.simulated and moment_ns not in self._records:
-            self._collect(moment_ns, SAMPLE.rows(len(self._robot.legs)))
-
-    def _collect(self, stamp_ns: int, rows: np.ndarray) -> None:
-        """Publish what was collected, if the estimates of the feet are due at this moment."""
-        if stamp_ns <= self._sent_ns < stamp_ns + SET_BACK_NS:
-            return  # the moment has been sent without it
-        self._records[stamp_ns] = rows
-        if self._pace.due(stamp_ns):
-            stamps = sorted(self._records)
-            self._send(Block(np.array(stamps), np.array([self._records[n] for n in stamps])))
-            self._records, self._sent_ns = {}, stamp_ns
+        self._samples.add(stamp_ns, sample_of(estimate))
 
     def _publish_doubt(self, doubt: str) -> None:
         self._doubts(String(data=doubt or self._lasting))

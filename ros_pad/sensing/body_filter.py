@@ -13,6 +13,7 @@ unobservable, as it is.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +51,14 @@ _APART = 1e2  # m²: variance of a measurement that must not count
 _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 _GYRO, _FORCE = slice(9, 12), slice(12, 15)
 RADIUS, SCALE, FEET = 15, 16, 17
+
+
+class _Given(NamedTuple):
+    """Deviations of a sample of gyro, rad/s, and accelerometer, m/s²; the gate of feet."""
+
+    gyro: float
+    force: float
+    gate: float
 
 
 class BodyFilter:
@@ -101,15 +110,10 @@ class BodyFilter:
         self.radius = self.scale = self.creep = 0.0
         self.covariance = np.zeros((size, size))
         self.rejected, self.lifted = np.zeros((2, legs), dtype=bool)
-        self._legs = legs
-        self._gate = gate
-        self._noise = gyro_noise, accelerometer_noise
-        self._step = np.eye(size)
-        self._inputs = np.zeros((size, 6))  # what errors of gyro and accelerometer do in a step
+        self._given = _Given(gyro_noise, accelerometer_noise, gate)
+        # What errors, and errors of gyro and accelerometer, do in a step.
+        self._step = np.eye(size), np.zeros((size, 6))
         self._last: tuple[Array, Array] | None = None
-        self._diagonal = self.covariance.ravel()[:: size + 1]
-        self._units = np.tile(_UNIT, (legs, 1))
-        self._blocks = np.arange(3 * legs).reshape(legs, 3)
 
     def spread(
         self,
@@ -122,17 +126,17 @@ class BodyFilter:
     ) -> None:
         """Set standard deviations in SI units, without correlations; of ``turn``, only tilt."""
         self.covariance[:] = 0.0
-        self._diagonal[0:2] = turn**2
-        self._diagonal[_SPEED] = velocity**2
-        self._diagonal[_GYRO] = gyro_bias**2
-        self._diagonal[_FORCE] = force_bias**2
-        self._diagonal[RADIUS], self._diagonal[SCALE] = radius**2, scale**2
+        _diagonal(self.covariance)[0:2] = turn**2
+        _diagonal(self.covariance)[_SPEED] = velocity**2
+        _diagonal(self.covariance)[_GYRO] = gyro_bias**2
+        _diagonal(self.covariance)[_FORCE] = force_bias**2
+        _diagonal(self.covariance)[RADIUS], _diagonal(self.covariance)[SCALE] = radius**2, scale**2
         self._last = None
 
     @property
     def deviations(self) -> tuple[float, float]:
         """Standard deviations of :attr:`radius`, m, and :attr:`scale`."""
-        radius, scale = np.sqrt(np.maximum(self._diagonal[RADIUS:FEET], 0.0)).tolist()
+        radius, scale = np.sqrt(np.maximum(_diagonal(self.covariance)[RADIUS:FEET], 0.0)).tolist()
         return radius, scale
 
     def reshape(self, radius: float, radius_sd: float, scale: float, scale_sd: float) -> None:
@@ -140,13 +144,16 @@ class BodyFilter:
         self.covariance[RADIUS:FEET] = 0.0
         self.covariance[:, RADIUS:FEET] = 0.0
         self.radius, self.scale = radius, scale
-        self._diagonal[RADIUS], self._diagonal[SCALE] = radius_sd**2, scale_sd**2
+        _diagonal(self.covariance)[RADIUS], _diagonal(self.covariance)[SCALE] = (
+            radius_sd**2,
+            scale_sd**2,
+        )
 
     def lose(self, turn: float = 0.01, velocity: float = 1.0) -> None:
         """Let rotation and velocity be less known, by so much, rad and m/s, as after a gap."""
-        self._diagonal[_SPEED] += velocity**2
-        self._diagonal[_TURN] += turn**2
-        self._diagonal[_PLACE] += velocity**2
+        _diagonal(self.covariance)[_SPEED] += velocity**2
+        _diagonal(self.covariance)[_TURN] += turn**2
+        _diagonal(self.covariance)[_PLACE] += velocity**2
         self._last = None
 
     def predict(self, dt: float, gyro: Array, force: Array, spin: Array) -> Array:
@@ -179,7 +186,7 @@ class BodyFilter:
     def _spread_on(self, dt: float, turn: Array, jump: float, spin: Array) -> None:
         """Advance the covariance."""
         turned = -dt * turn
-        step, inputs = self._step, self._inputs
+        step, inputs = self._step
         inputs[_TURN, :3] = turned
         inputs[_SPEED, :3] = skew(self.velocity) @ turned
         inputs[_SPEED, 3:] = turned
@@ -189,17 +196,17 @@ class BodyFilter:
         step[_SPEED, _TURN] = dt * _FALL
         step[_PLACE, _TURN] = -dt * skew(self.velocity)
         step[_PLACE, _SPEED] = dt * _UNIT
-        step[FEET:, _SPEED] = -dt * self._units
+        step[FEET:].reshape(-1, 3, step.shape[1])[..., _SPEED] = -dt * _UNIT
         step[FEET:, RADIUS] = dt * spin.ravel()
-        gyro, force = self._noise
+        gyro, force, _ = self._given
         noise = np.array((gyro, math.sqrt(force**2 + JUMP**2 * jump)))[_SIX] * inputs
         self.covariance[:] = step @ self.covariance @ step.T + noise @ noise.T
-        self._diagonal[_GYRO] += GYRO_DRIFT**2 * dt
-        self._diagonal[_FORCE] += FORCE_DRIFT**2 * dt
+        _diagonal(self.covariance)[_GYRO] += GYRO_DRIFT**2 * dt
+        _diagonal(self.covariance)[_FORCE] += FORCE_DRIFT**2 * dt
         unsure = ROLLING_ERROR * self.radius
         stray = (STRAY**2 + self.creep**2 + ROLLING_TIME * unsure**2 * (spin * spin).sum(1)) * dt
-        self._diagonal[FEET:].reshape(-1, 3)[:] += stray[:, None]
-        self._diagonal[FEET + 2 :: 3] += SINKING**2 * dt
+        _diagonal(self.covariance)[FEET:].reshape(-1, 3)[:] += stray[:, None]
+        _diagonal(self.covariance)[FEET + 2 :: 3] += SINKING**2 * dt
 
     def set_down(
         self, feet: Flags, places: Array, hips: Array, noise: Array, level: bool = False
@@ -261,7 +268,7 @@ class BodyFilter:
         lines = (self.footholds - hips).reshape(-1, 1)
         seen = self.covariance[FEET:] - lines * self.covariance[SCALE]
         spread = seen[:, FEET:] - seen[:, SCALE, None] * lines.T
-        count = self._legs
+        count = len(self.footholds)
         cells = spread.reshape(count, 3, count, 3)
         each = np.arange(count)
         cells[each, :, each] += noise
@@ -272,7 +279,7 @@ class BodyFilter:
         miss = miss.ravel()
         root, _ = dpotrf(spread, lower=1)
         score, _ = dtrtrs(root, miss, lower=1)
-        if score @ score > self._gate:
+        if score @ score > self._given.gate:
             root = self._judge(spread, diagonal, miss, standing, slipping)
         # Not dtrtrs for many columns: OpenBLAS wakes threads for it, for 100 µs or ms.
         inverse, _ = dtrtri(root, lower=1)
@@ -292,18 +299,18 @@ class BodyFilter:
         self, spread: Array, diagonal: Array, miss: Array, standing: Flags, slipping: Flags
     ) -> Array:
         """Reject feet one by one, judged in order of consistency; return the root of the rest."""
-        legs = self._legs
+        legs = len(self.footholds)
         each = np.arange(legs)
         own = spread.reshape(legs, 3, legs, 3)[each, :, each]
         rows = miss.reshape(legs, 3)
         alone = (rows * np.linalg.solve(own, rows[..., None])[..., 0]).sum(1)
-        order = self._blocks[np.argsort(alone)]
+        order = np.arange(3 * legs).reshape(legs, 3)[np.argsort(alone)]
         weak = slipping.copy()
         for _ in range(2 * legs):
             chosen = order.ravel()
             root, _ = dpotrf(spread[np.ix_(chosen, chosen)], lower=1)
             score, _ = dtrtrs(root, miss[chosen], lower=1)
-            bad = np.flatnonzero((score.reshape(legs, 3) ** 2).sum(1) > self._gate)
+            bad = np.flatnonzero((score.reshape(legs, 3) ** 2).sum(1) > self._given.gate)
             if not bad.size:
                 break
             foot = int(order[bad[0], 0]) // 3
@@ -326,7 +333,10 @@ class BodyFilter:
     def sound(self) -> bool:
         """Return whether velocity and covariance are such as a robot can have."""
         speed = float(self.velocity @ self.velocity)
-        least, most = float(self._diagonal.min()), float(self._diagonal.max())
+        least, most = (
+            float(_diagonal(self.covariance).min()),
+            float(_diagonal(self.covariance).max()),
+        )
         return speed < FASTEST**2 and least > -1e-9 and most < math.inf  # false for NaN, too
 
     def apply(self, error: Array) -> None:
@@ -351,3 +361,8 @@ FORCE_DRIFT = 1e-3
 _UNIT = np.eye(3)
 _SIX = np.array((0, 0, 0, 1, 1, 1))
 _FALL = skew(GRAVITY)
+
+
+def _diagonal(square: Array) -> Array:
+    """Return the diagonal of a square array, to be changed in place."""
+    return square.ravel()[:: len(square) + 1]

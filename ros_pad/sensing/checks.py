@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from ros_pad.configuration import quantity
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array, cross
+from ros_pad.robots.rotation import Array, cross, skew
 from ros_pad.sensing.estimator import DAMPING, LONGEST_STEP, WEIGHT
 
 Flags = npt.NDArray[np.bool_]
@@ -42,7 +42,7 @@ SURE = 6.0  # standard deviations
 Progress: TypeAlias = Callable[[float], None]
 
 
-def _unseen(share: float) -> None:
+def unseen(share: float) -> None:
     """Show nothing."""
 
 
@@ -55,11 +55,13 @@ class Finding(NamedTuple):
     advice: str
 
 
-def _problem(what: str, found: str, advice: str) -> Finding:
+def problem(what: str, found: str, advice: str) -> Finding:
+    """Return a problem."""
     return Finding(what, 'problem', found, advice)
 
 
-def _warning(what: str, found: str, advice: str) -> Finding:
+def warning(what: str, found: str, advice: str) -> Finding:
+    """Return a warning."""
     return Finding(what, 'warning', found, advice)
 
 
@@ -213,15 +215,6 @@ class Recording:
         moves = ~self.rests[found.first]
         return _Pairs(found.first[moves], found.arm[moves], found.drift[moves])
 
-    def with_gyro(self, gyro: Array) -> Recording:
-        """Return the recording with other readings of the gyro."""
-        other = replace(self, gyro=gyro)
-        # What does not depend on the gyro is not computed again.
-        for name in ('speeds', 'kinematics', 'ground_forces', 'stands', 'rests', 'pairs', 'pull'):
-            if name in vars(self):
-                vars(other)[name] = vars(self)[name]
-        return other
-
     def reversed(self, joint: int) -> Recording:
         """Return the recording with one joint the other way round."""
         signs = np.ones(len(self.robot.joint_names))
@@ -237,7 +230,7 @@ class Recording:
         return other
 
 
-def _axis(vector: Array) -> str:
+def axis_of(vector: Array) -> str:
     """Return the name of the axis nearest to a vector, with its sign."""
     index = int(np.abs(vector).argmax())
     return ('-' if vector[index] < 0.0 else '') + 'xyz'[index]
@@ -251,12 +244,12 @@ def rates(recording: Recording) -> list[Finding]:
         rate = 1.0 / max(float(np.median(steps)), 1e-9)
         if rate < 0.97 * SLOWEST:
             advice = f'{SLOWEST:g} to {FASTEST:g} Hz are wanted: set it in the driver'
-            found.append(_warning(what, f'{rate:.0f} samples a second', advice))
+            found.append(warning(what, f'{rate:.0f} samples a second', advice))
         gaps = steps > max(LONGEST_STEP, 3.0 / rate)
         if gaps.any():
             advice = 'feet count as lifted in a gap: look for a busy computer or network'
             text = f'{gaps.sum()} gaps in the stamps, the longest of {steps.max():.3g} s'
-            found.append(_warning(what, text, advice))
+            found.append(warning(what, text, advice))
     return found
 
 
@@ -270,7 +263,7 @@ def stamps(recording: Recording) -> list[Finding]:
         back = int((np.diff(times) <= 0.0).sum())
         if back:
             advice = 'each message needs its own time of measurement in header.stamp'
-            found.append(_problem(what, f'{back} stamps are not after the one before', advice))
+            found.append(problem(what, f'{back} stamps are not after the one before', advice))
         elif len(arrival) == len(times):
             ratios.append(float((arrival[-1] - arrival[0]) / (times[-1] - times[0])))
             offsets.append(float(np.median(times - arrival)))
@@ -281,16 +274,16 @@ def stamps(recording: Recording) -> list[Finding]:
             if abs(ratio - 1.0) > 0.02:
                 text = f'1 s of its stamps takes {ratio:.3g} s'
                 advice = 'the stamps are not times: use stamp: arrival in the mapping'
-                found.append(_problem(what, text, advice))
+                found.append(problem(what, text, advice))
     elif len(offsets) == 2 and abs(offsets[0] - offsets[1]) > 0.5:
         text = f'stamps are {offsets[0] - offsets[1]:.3g} s after those of the joints'
-        found.append(_problem('imu', text, 'both need one clock, to 1 ms'))
+        found.append(problem('imu', text, 'both need one clock, to 1 ms'))
     elif abs(ratios[0] - 1.0) > 0.02:
         text = f'1 s of them takes {ratios[0]:.3g} s: right only in a simulation'
-        found.append(_warning('stamps', text, 'on a robot: use stamp: arrival in the mapping'))
+        found.append(warning('stamps', text, 'on a robot: use stamp: arrival in the mapping'))
     elif abs(offsets[0]) > 1.0:
         text = f'they differ from the time of arrival by {offsets[0]:.3g} s: another clock'
-        found.append(_warning('stamps', text, 'synchronise the clocks (chrony, ptp4l)'))
+        found.append(warning('stamps', text, 'synchronise the clocks (chrony, ptp4l)'))
     return found
 
 
@@ -303,17 +296,17 @@ def gravity(recording: Recording) -> list[Finding]:
     text = f'{size:.3g} m/s2 {when}, {WEIGHT:g} is gravity'
     if size < 0.4:
         advice = 'the driver has taken gravity off: use its raw data (imu/data_raw)'
-        return [_problem('accelerometer', f'shows no gravity: {text}', advice)]
+        return [problem('accelerometer', f'shows no gravity: {text}', advice)]
     if abs(size * WEIGHT - WEIGHT) < GRAVITY_ERROR:
-        return [_problem('accelerometer', f'is in g: {text}', 'scale: 9.80665 in the mapping')]
+        return [problem('accelerometer', f'is in g: {text}', 'scale: 9.80665 in the mapping')]
     found = []
     if abs(size - WEIGHT) > (1.0 if rests else 2.0) * GRAVITY_ERROR:
         advice = f'scale: {WEIGHT / size:.4g} in the mapping, or calibrate it'
-        found.append(_problem('accelerometer', f'has a wrong scale: {text}', advice))
+        found.append(problem('accelerometer', f'has a wrong scale: {text}', advice))
     if mean[2] < 0.85 * size:
-        text = f'gravity is on {_axis(mean)} of the base, and should be on z'
+        text = f'gravity is on {axis_of(mean)} of the base, and should be on z'
         advice = 'axes in the mapping, or the pose of the IMU in the robot file, are wrong'
-        found.append(_problem('accelerometer', text, advice))
+        found.append(problem('accelerometer', text, advice))
     return found
 
 
@@ -323,46 +316,7 @@ def ranges(recording: Recording) -> list[Finding]:
     if most < LARGEST:
         return []
     advice = 'in degrees? scale: 0.01745329252 of the joints in the mapping'
-    return [_problem('joints', f'positions up to {most:.3g} rad (or m)', advice)]
-
-
-def velocities(recording: Recording) -> list[Finding]:
-    """Check that joint velocities are the derivatives of joint positions."""
-    if recording.velocities is None or np.median(np.diff(recording.joint_time)) > LONGEST_STEP:
-        return []  # too few to be integrated
-    found: dict[str, list[tuple[str, float]]] = {}
-    times, q, dq = recording.joint_time, recording.positions, recording.velocities
-    steps = np.diff(times)[:, None]
-    moved = np.vstack([np.zeros(q.shape[1]), np.cumsum(0.5 * (dq[1:] + dq[:-1]) * steps, axis=0)])
-    span = max(1, round(0.1 / float(np.median(steps))))
-    if len(times) < span + FEWEST:
-        return []
-    changes, sums = (values[span:] - values[:-span] for values in (q, moved))
-    for name, change, total in zip(recording.robot.joint_names, changes.T, sums.T, strict=True):
-        if change.std() < 5e-3 and total.std() < 0.02:
-            continue  # it did not move
-        sizes = float(np.linalg.norm(change) * np.linalg.norm(total))
-        fits = float(change @ total) / max(sizes, 1e-12)
-        ratio = float(np.linalg.norm(total) / max(float(np.linalg.norm(change)), 1e-9))
-        if abs(fits) < 0.7:
-            text = 'velocity does not fit the change of position'
-        elif fits < 0.0:
-            text = 'velocity is reversed against position'
-        elif not 0.8 < ratio < 1.25:
-            text = 'velocity is {:.3g} times the change of position'
-        else:
-            continue
-        found.setdefault(text, []).append((name, ratio))
-    advice = 'mend the driver, or leave velocities out of the mapping: differences replace them'
-    all_ = len(recording.robot.joint_names)
-    return [
-        _problem(
-            'joints' if len(some) == all_ else f'joint {", ".join(name for name, _ in some)}',
-            text.format(np.median([ratio for _, ratio in some])),
-            advice,
-        )
-        for text, some in found.items()
-    ]
+    return [problem('joints', f'positions up to {most:.3g} rad (or m)', advice)]
 
 
 class _Pairs(NamedTuple):
@@ -402,13 +356,14 @@ def _mean(values: Array, span: int) -> Array:
     return (sums[span:] - sums[:-span] + 0.5 * (values[:-span] - values[span:])) / span
 
 
-def _without_bias(recording: Recording) -> Array:
-    """Return the angular velocity without the bias that the gyro shows at rest."""
-    rests = recording.rests
-    return recording.rate - (recording.rate[rests].mean(0) if rests.any() else 0.0)
+def _rate(recording: Recording, late: float = 0.0) -> Array:
+    """Return the angular velocity, ``late`` s ago, without the bias that it shows at rest."""
+    rate, rests = recording.rate, recording.rests
+    bias = rate[rests].mean(0) if rests.any() else 0.0
+    return (recording.at_joints(recording.gyro, late) if late else rate) - bias
 
 
-def _better(before: Array, after: Array) -> float:
+def better(before: Array, after: Array) -> float:
     """Return how sure it is that errors are smaller than before, in standard deviations."""
     gain = before - after
     # Windows overlap by two thirds.
@@ -416,133 +371,120 @@ def _better(before: Array, after: Array) -> float:
     return float(gain.mean()) / max(deviation, 1e-12)
 
 
-class _Guess(NamedTuple):
-    """Something that may be wrong, and the recording without it."""
-
-    finding: Finding
-    simple: int  # number of things that it takes to be wrong
-    mended: Recording
-
-
-def mend(recording: Recording, progress: Progress = _unseen) -> tuple[list[Finding], Recording]:
+def turned(recording: Recording, progress: Progress = unseen) -> tuple[list[Finding], Recording]:
     """Check joints and gyro against each other: feet that stand do not move against each other.
 
-    Of all single faults (a joint reversed, a gyro turned, negated or in degrees), the one is
-    found with which feet stand still best; then another one, until no other helps.
+    Joints are reversed if feet then stand still, with any axes and unit of the gyro; with these
+    joints, least squares of what feet and gyro show of the rotation give its axes and unit.
 
     Returns
     -------
     findings : list of Finding
-    mended : Recording
-        The recording without these faults.
+    recording : Recording
+        With the joints as they should be.
     """
     found: list[Finding] = []
-    while len(found) < len(recording.robot.joint_names):
-        # How many faults there are is not known before: each takes half of the share that is left.
-        guess = _first_guess(recording, progress, 0.5 ** len(found))
-        if guess is None or guess.finding in found:
+    names = recording.robot.joint_names
+    while len(recording.pairs.first) >= FEWEST and len(found) < len(names):
+        others = []
+        for joint in range(len(names)):
+            others.append(recording.reversed(joint))
+            # How many are reversed is not known before: each takes half of the share that is left.
+            progress(1.0 - 0.5 ** len(found) * (1.0 - 0.5 * (joint + 1) / len(names)))
+        _, before = _fit(recording)
+        errors = [_fit(each)[1] if len(each.pairs.first) else before for each in others]
+        best = int(np.argmin([each.mean() for each in errors]))
+        finding = _reversed(names[best])
+        if finding in found or not _explains(before, errors[best]):
             break
-        found.append(guess.finding)
-        recording = guess.mended
+        found.append(finding)
+        recording = others[best]
     progress(1.0)
-    return found, recording
+    return [*found, *_gyro(recording)], recording
 
 
-def _first_guess(recording: Recording, progress: Progress, left: float) -> _Guess | None:
-    """Return the simplest fault that explains motion of standing feet best, or None."""
-    before = _errors(recording)
-    guesses: list[tuple[_Guess, Array]] = []
-    if len(before) < FEWEST:
-        return None
-    tried = [*_gyro_guesses(recording), *_joint_guesses(recording)]
-    for number, guess in enumerate(tried, 1):
-        after = _errors(guess.mended)
-        sure = _better(before, after)
-        if sure > SURE or (sure > 0.5 * SURE and after.mean() < 0.7 * before.mean()):
-            guesses.append((guess, after))
-        progress(1.0 - left * (1.0 - 0.5 * number / len(tried)))
-    if not guesses:
-        return None
-    _, best = min(guesses, key=lambda each: float(each[1].mean()))
-    alike = [each for each in guesses if _better(each[1], best) < 3.0]
-    return min(alike, key=lambda each: (each[0].simple, float(each[1].mean())))[0]
+def _reversed(name: str) -> Finding:
+    advice = f'reversed: [{name}] in the mapping, or the axis in the robot file'
+    return problem(f'joint {name}', 'is reversed: its foot moves as if it slipped', advice)
 
 
-def _errors(recording: Recording) -> Array:
-    """Return how fast pairs of standing feet move against each other in windows, m/s."""
-    span = recording.span
+def _explains(before: Array, after: Array) -> bool:
+    """Return whether errors are so much smaller that what was wrong is known."""
+    if len(before) != len(after):
+        return bool(after.mean() < 0.5 * before.mean())
+    sure = better(before, after)
+    return sure > SURE or (sure > 0.5 * SURE and after.mean() < 0.7 * before.mean())
+
+
+def _fit(recording: Recording) -> tuple[Array, Array]:
+    """Return the matrix from the gyro's rate to that of the legs, and the errors that are left."""
     pairs = recording.pairs
-    rate = _mean(_without_bias(recording), span)[pairs.first]
-    return np.asarray(np.linalg.norm(pairs.drift + cross(rate, pairs.arm), axis=1))
+    rate = _mean(_rate(recording), recording.span)[pairs.first]
+    lines = skew(pairs.arm)[..., None] * rate[:, None, None]
+    lines = lines.reshape(-1, 9)
+    matrix = _least_squares(lines, pairs.drift.ravel())
+    return matrix.reshape(3, 3), sizes(pairs.drift - (lines @ matrix).reshape(-1, 3))
 
 
-def _gyro_guesses(recording: Recording) -> list[_Guess]:
+def rolling_errors(recording: Recording, turn: Array | None = None, late: float = 0.0) -> Array:
+    """Return how fast pairs of standing feet move against each other in windows, m/s.
+
+    The rate of the gyro is turned by a matrix, and taken from ``late`` s before.
+    """
+    pairs = recording.pairs
+    rate = _mean(_rate(recording, late), recording.span)[pairs.first]
+    rate = rate if turn is None else rate @ turn.T
+    return sizes(pairs.drift + cross(rate, pairs.arm))
+
+
+def _along(matrix: Array) -> Array:
+    """Return the axes, with their signs, that a matrix of least squares shows; own if unclear."""
+    size, rows = float(np.abs(matrix).max()), np.arange(len(matrix))
+    known = np.where(np.abs(matrix) > 0.3 * size, matrix, 0.0) + 0.2 * size * np.eye(len(rows))
+    orders = [np.array(order) for order in itertools.permutations(rows)]
+    order = max(orders, key=lambda each: float(np.abs(known[rows, each]).sum()))
+    turn = np.zeros_like(matrix)
+    turn[rows, order] = np.where(known[rows, order] < 0.0, -1.0, 1.0)
+    return turn
+
+
+def _gyro(recording: Recording) -> list[Finding]:
+    """Return findings about axes and unit of the gyro."""
+    if len(recording.pairs.first) < FEWEST:
+        return []
+    matrix, _ = _fit(recording)
+    turn = _along(matrix)
+    scale = math.pi / 180.0 if np.abs(matrix).max() < 0.1 else 1.0
+    if not _explains(rolling_errors(recording), rolling_errors(recording, scale * turn)):
+        return []
     found = []
-
-    def guess(text: str, advice: str, turn: Array, simple: int) -> None:
-        to_base = recording.robot.imu[:3, :3]
-        other = recording.with_gyro(recording.gyro @ (to_base.T @ turn @ to_base).T)
-        found.append(_Guess(_problem('gyro', text, advice), simple, other))
-
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            # Rows: the axis of the base, and the axis of the gyro that has its rate.
-            turn = np.eye(3)[list(order)] * np.array(signs)[:, None]
-            wrong = [axis for axis in range(3) if turn[axis, axis] != 1.0]
-            if wrong:
-                rows = [f'{"xyz"[row]} is on {_axis(turn[row])}' for row in wrong]
-                guess(
-                    f'its axes do not fit the legs: rotation about {", about ".join(rows)}',
-                    _turn_back(recording, turn),
-                    turn,
-                    len(wrong),
-                )
-    scale = math.pi / 180.0
-    guess('is in degrees per second', f'scale: {scale:.10g} in the mapping', scale * np.eye(3), 1)
+    if scale != 1.0:
+        advice = f'scale: {scale:.10g} in the mapping'
+        found.append(problem('gyro', 'is in degrees per second', advice))
+    wrong = [
+        f'{"xyz"[axis]} is on {axis_of(turn[axis])}' for axis in range(3) if turn[axis, axis] < 1
+    ]
+    if wrong:
+        text = f'its axes do not fit the legs: rotation about {", about ".join(wrong)}'
+        found.append(problem('gyro', text, _turn_back(recording, turn)))
     return found
 
 
 def _turn_back(recording: Recording, turn: Array) -> str:
     """Return advice how to turn an IMU: rows have the sensor's axis of each axis of the base."""
-    axes = f'[{", ".join(map(_axis, turn))}]'
+    axes = f'[{", ".join(map(axis_of, turn))}]'
     if np.array_equal(recording.robot.imu[:3, :3], np.eye(3)):
         return f'axes: {axes} in the mapping, or turn the IMU in the robot file'
     return f'turn the IMU in the robot file: what it calls x, y, z of the base is {axes}'
 
 
-def _joint_guesses(recording: Recording) -> list[_Guess]:
-    return [
-        _Guess(_reversed(name), 1, recording.reversed(joint))
-        for joint, name in enumerate(recording.robot.joint_names)
-    ]
-
-
-def _reversed(name: str) -> Finding:
-    advice = f'reversed: [{name}] in the mapping, or the axis in the robot file'
-    return _problem(f'joint {name}', 'is reversed: its foot moves as if it slipped', advice)
-
-
-def levels(recording: Recording) -> tuple[list[Finding], Recording]:
-    """Check at rest that the feet are in one plane below the body.
-
-    Returns
-    -------
-    findings : list of Finding
-    mended : Recording
-        The recording with the one joint reversed that brings the feet into a plane, if there is
-        such a joint.
-    """
+def levels(recording: Recording) -> list[Finding]:
+    """Check at rest that the feet are in one plane below the body."""
     if not recording.rests.any():
-        return [], recording
-    q = recording.positions[recording.rests].mean(0)
-    off = _off_plane(recording, q)
+        return []
+    off = _off_plane(recording, recording.positions[recording.rests].mean(0))
     if off.max() < UNEVEN:
-        return [], recording
-    signs = 1.0 - 2.0 * np.eye(len(q))
-    left = [float(_off_plane(recording, q * each).max()) for each in signs]
-    best = int(np.argmin(left))
-    if left[best] < 0.5 * UNEVEN and sorted(left)[1] > 2.0 * left[best]:
-        return [_reversed(recording.robot.joint_names[best])], recording.reversed(best)
+        return []
     leg = recording.robot.legs[int(off.argmax())]
     text = (
         f'at rest foot {leg} is {off.max():.2g} m off the plane of the others, or the plane leans'
@@ -550,7 +492,7 @@ def levels(recording: Recording) -> tuple[list[Finding], Recording]:
     advice = (
         'on a flat floor: look for a reversed joint, a wrong zero, a wrong foot link or length'
     )
-    return [_problem('feet', text, advice)], recording
+    return [problem('feet', text, advice)]
 
 
 def _off_plane(recording: Recording, q: Array) -> Array:
@@ -569,85 +511,18 @@ def _off_plane(recording: Recording, q: Array) -> Array:
 
 def delay(recording: Recording) -> list[Finding]:
     """Check that IMU and joints have the same time: when the gyro fits the legs best."""
-    span, pairs = recording.span, recording.pairs
-    if len(pairs.first) < FEWEST:
+    if len(recording.pairs.first) < FEWEST:
         return []
-    bias = recording.rate - _without_bias(recording)
-
-    def errors(late: float) -> Array:
-        rate = _mean(recording.at_joints(recording.gyro, late) - bias, span)[pairs.first]
-        return np.asarray(np.linalg.norm(pairs.drift + cross(rate, pairs.arm), axis=1))
-
     tried = np.arange(-LONGEST_DELAY, LONGEST_DELAY + 5e-4, 1e-3)
-    best = float(tried[int(np.argmin([errors(late).mean() for late in tried]))])
-    if abs(best) <= DELAY or _better(errors(0.0), errors(best)) < 0.5 * SURE:
+    best = float(min(tried, key=lambda late: float(rolling_errors(recording, late=late).mean())))
+    gain = better(rolling_errors(recording), rolling_errors(recording, late=best))
+    if abs(best) <= DELAY or gain < 0.5 * SURE:
         return []
     text = (
         f'stamps are {1e3 * abs(best):.0f} ms {"later" if best > 0.0 else "earlier"} than the IMU'
     )
     advice = f'stamp both where they are measured, or delay: {best:.3f} in the mapping'
-    return [_warning('joints', f"{text}'s for the same motion", advice)]
-
-
-def forces(recording: Recording) -> list[Finding]:
-    """Check sign, axis and unit of the forces on the feet at rest."""
-    found = recording.ground_forces
-    if found is None:
-        advice = 'velocity, effort or foot forces: without one of the last two no foot stands'
-        return [_problem('force', 'neither foot forces nor efforts arrive', advice)]
-    measured = recording.forces is not None
-    what = 'foot forces' if measured else 'efforts'
-    if not np.any(recording.forces if measured else recording.efforts):
-        advice = 'does the driver measure them? Leave them out of the mapping if not'
-        return [_problem(what, 'are all zero', advice)]
-    sizes = np.linalg.norm(found, axis=2).max(0)
-    idle = [
-        leg
-        for leg, size in zip(recording.robot.legs, sizes, strict=True)
-        if size < 0.02 * sizes.max()
-    ]
-    if idle:
-        text = f'foot {", ".join(map(str, idle))} never carries load'
-        return [_problem(what, text, 'is its sensor connected, and the leg the right one?')]
-    if recording.force_kind == 'contact':
-        return []
-    mean, up = recording.calm(found).mean(0), recording.up
-    total = mean.sum(0)
-    size = float(np.linalg.norm(total))
-    if total @ up < -0.7 * size:
-        text = 'are reversed: the robot would hang from its feet'
-        advice = f'{"scale" if measured else "effort_scale"}: -1.0 in the mapping'
-        return [_problem(what, text, advice)]
-    if total @ up < 0.7 * size:
-        text = f'are along {_axis(total)} of the base at rest, and should be along z'
-        return [_problem(what, text, _axes_advice(recording))]
-    weight = recording.robot.mass * WEIGHT
-    lines = []
-    for leg, force in zip(recording.robot.legs, mean, strict=True):
-        if force @ up < -0.05 * size:
-            lines.append((f'that of foot {leg} is reversed', 'scale: -1.0 for this foot'))
-        elif np.linalg.norm(force) > 0.05 * size and force @ up < 0.5 * np.linalg.norm(force):
-            text = f'that of foot {leg} is along {_axis(force)} of the base at rest'
-            lines.append((text, 'its axes are turned: it should be along z'))
-    if not lines and weight and not 0.75 < size / weight < 1.33:
-        text = f'add up to {size:.3g} at rest, and the robot weighs {weight:.3g} N'
-        whole = measured and np.array_equal(found, np.round(found))
-        advice = (
-            f'{"counts, not newtons: " if whole else ""}scale: {weight / size:.3g} in the mapping'
-        )
-        lines.append((text, advice if measured else advice.replace('scale', 'effort_scale')))
-    return [_problem(what, text, advice) for text, advice in lines]
-
-
-def _axes_advice(recording: Recording) -> str:
-    """Return how forces at rest that are not along z may come to be."""
-    other = 'foot' if recording.force_axes == 'base' else 'base'
-    found = replace(recording, force_axes=other).ground_forces
-    if recording.forces is not None and found is not None:
-        mean = recording.calm(found).mean(0).sum(0)
-        if mean @ recording.up > 0.9 * np.linalg.norm(mean):
-            return f'force_axes: {other} in the mapping'
-    return 'axes, or force_axes (base or foot), in the mapping'
+    return [warning('joints', f"{text}'s for the same motion", advice)]
 
 
 def horizontal(recording: Recording) -> list[Finding]:
@@ -667,130 +542,40 @@ def horizontal(recording: Recording) -> list[Finding]:
         which = 'accelerometer or foot forces'
     text = (
         'horizontal axes are turned against the motion: x of the accelerometer is'
-        f' {_axis(turn[0])} of the forces, y is {_axis(turn[1])}'
+        f' {axis_of(turn[0])} of the forces, y is {axis_of(turn[1])}'
     )
-    advice = f'axes: [{_axis(turn[0])}, {_axis(turn[1])}, z] of the forces in the mapping'
+    advice = f'axes: [{axis_of(turn[0])}, {axis_of(turn[1])}, z] of the forces in the mapping'
     if which == 'accelerometer':
         advice = _turn_back(recording, turn.T)
     elif which != 'foot forces':
         advice = 'axes in the mapping, or the pose of the IMU in the robot file, are wrong'
-    return [_problem(which, text, advice)]
+    return [problem(which, text, advice)]
 
 
 def _turned(recording: Recording, forces: Array) -> Array | None:
     """Return how the total force must be turned about z to fit the accelerometer, or None."""
-    eye = np.eye(2)
-    plain = _push_errors(recording, forces, eye)
-    if len(plain) < FEWEST:
+    total, wanted = pushes(recording, forces)
+    if len(total) < FEWEST:
         return None
-    turns = [
-        row * np.array(signs)[:, None]
-        for row in (eye, eye[::-1])
-        for signs in itertools.product((1.0, -1.0), repeat=2)
-    ]
-    errors = [_push_errors(recording, forces, turn) for turn in turns]
-    best = min(range(len(turns)), key=lambda index: float(errors[index].mean()))
-    if errors[best].mean() > 0.7 * plain.mean() or _better(plain, errors[best]) < SURE:
-        return None
-    found = np.eye(3)
-    found[:2, :2] = turns[best]
-    return found
+    turn = np.eye(3)
+    turn[:2, :2] = _along(_least_squares(total, wanted).T)
+    plain, after = (sizes(total @ each.T - wanted) for each in (np.eye(2), turn[:2, :2]))
+    return turn if after.mean() < 0.7 * plain.mean() and better(plain, after) > SURE else None
 
 
-def _push_errors(recording: Recording, found: Array, turn: Array) -> Array:
-    """Return how much the total force, turned, differs from mass times specific force, N."""
+def pushes(recording: Recording, forces: Array) -> tuple[Array, Array]:
+    """Return the total force along the ground, and mass times specific force, (k, 2), N."""
     span = 3 * recording.span
     moves = np.flatnonzero(~recording.rests[: len(recording.rests) - span])[:: max(1, span // 3)]
-    total = _mean(found.sum(1), span)[moves, :2] @ turn.T
+    total = _mean(forces.sum(1), span)[moves, :2]
     wanted = recording.robot.mass * _mean(recording.pull, span)[moves, :2]
-    if not len(moves):
-        return np.zeros(0)
-    errors = total - total.mean(0) - wanted + wanted.mean(0)
-    return np.asarray(np.linalg.norm(errors, axis=1))
+    return (total - total.mean(0), wanted - wanted.mean(0)) if len(moves) else (total, wanted)
 
 
-def swings(recording: Recording) -> list[Finding]:
-    """Check that feet swing above the floor on which the others stand."""
-    heights = recording.kinematics[0] @ recording.up
-    stands = recording.stands
-    some = stands.sum(1) >= 2
-    if not some.any():
-        return []
-    floor = np.where(stands, heights, 0.0).sum(1) / np.maximum(stands.sum(1), 1)
-    found = []
-    for leg, name in enumerate(recording.robot.legs):
-        below = (floor - heights[:, leg])[some & ~recording.rests]
-        depth = float(np.quantile(below, 0.95)) if len(below) else 0.0
-        if depth > SUNK:
-            advice = 'look for a reversed joint, a wrong zero, a wrong foot link or length'
-            text = f'foot {name} goes {depth:.2g} m below the floor on which others stand'
-            found.append(_problem('feet', text, advice))
-    return found
+def _least_squares(lines: Array, values: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(lines, values, rcond=None)[0], dtype=np.float64)
 
 
-def unjudged(recording: Recording, progress: Progress = _unseen) -> list[str]:
-    """Return what moved too little to be judged: axes of the gyro, joints, the delay."""
-    if ranges(recording):
-        return ['all but the positions of joints']
-    before = _errors(recording)
-    if len(before) < FEWEST:
-        return ['gyro, joints and their delay: the robot did not move on its feet']
-
-    def unclear(after: Array) -> bool:
-        sure = _better(after, before)
-        return sure < 0.5 * SURE or (sure < SURE and before.mean() > 0.7 * after.mean())
-
-    flips = {
-        f'gyro about {axis}': recording.with_gyro(recording.gyro @ flip)
-        for axis, flip in zip('xyz', _flips(recording), strict=True)
-    }
-    others = {each.finding.what: each.mended for each in _joint_guesses(recording)}
-    found = []
-    for number, (name, other) in enumerate((flips | others).items(), 1):
-        if unclear(_errors(other)):
-            found.append(name)
-        progress(number / (len(flips) + len(others)))
-    late = replace(recording, imu_time=recording.imu_time + 0.01)
-    vars(late).update(pairs=recording.pairs, rests=recording.rests)
-    if unclear(_errors(late)):
-        found.append('delay between IMU and joints')
-    push = recording.ground_forces
-    if push is not None and recording.force_kind == 'vector':
-        before = _push_errors(recording, push, np.eye(2))
-        if unclear(_push_errors(recording, push, -np.eye(2))):
-            found.append('horizontal axes of accelerometer and forces')
-    return found
-
-
-def _flips(recording: Recording) -> list[Array]:
-    """Return the matrices that negate the gyro's rate about x, y or z of the base."""
-    to_base = recording.robot.imu[:3, :3]
-    return [to_base.T @ np.diag(1.0 - 2.0 * row) @ to_base for row in np.eye(3)]
-
-
-def examine(recording: Recording, progress: Progress = _unseen) -> list[Finding]:
-    """Run all checks; each fault that is found is mended before the next check.
-
-    Parameters
-    ----------
-    recording : Recording
-        Some seconds; better with the robot at rest first, and then walking.
-    progress : callable
-        Called now and then with the share that is done, 0 to 1.
-
-    Returns
-    -------
-    list of Finding
-        Empty if nothing is wrong.
-    """
-    found = [*stamps(recording), *ranges(recording)]
-    if any(each.status == 'problem' for each in found):
-        return found  # without times and angles, nothing else can be judged
-    found += [*rates(recording), *gravity(recording), *velocities(recording)]
-    uneven, level = levels(recording)
-    moved, fine = mend(level, progress)
-    found += [*uneven, *moved]
-    if not (uneven or moved):
-        found += [*swings(fine), *delay(fine)]
-    loads = forces(fine)
-    return [*found, *loads, *([] if loads or gravity(recording) else horizontal(fine))]
+def sizes(vectors: Array) -> Array:
+    """Return the lengths of vectors, (k,)."""
+    return np.asarray(np.linalg.norm(vectors, axis=1))

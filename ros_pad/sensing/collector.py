@@ -11,7 +11,8 @@ import numpy as np
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
-from ros_pad.sensing.checks import Finding, Progress, Recording, examine, unjudged
+from ros_pad.sensing.checks import Finding, Progress, Recording
+from ros_pad.sensing.examine import examine, unjudged
 from ros_pad.sensing.mapping import Mapping, Readings
 
 SHORTEST = 1.0

@@ -4,16 +4,29 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice, instance, number, quantity
+from ros_pad.configuration import choice, instance, number
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Kinematics, Robot
 from ros_pad.robots.rotation import Array, cross, quaternion, rotation, skew
 from ros_pad.sensing.body_filter import GATE, GRAVITY, BodyFilter, Flags
+from ros_pad.sensing.motion import (
+    Body,
+    BodyEstimate,
+    Checks,
+    Doubts,
+    Feet,
+    FootMotion,
+    Length,
+    Noise,
+    Options,
+    Rest,
+    checked,
+)
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Shift, Unloaded
 from ros_pad.sensing.slip_window import SlipWindow
 
@@ -89,71 +102,8 @@ UNSTEADY = 1.5
 are not independent."""
 
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
-_NONE = np.zeros(0)
 FOOT_NOISE = 1e-4  # m: kinematics that are not quite right
 DAMPING = 1e-4  # m²: keeps forces finite where the leg is straight
-
-
-class FootMotion(NamedTuple):
-    """One foot after a sample; all vectors in odom axes.
-
-    Attributes
-    ----------
-    position : array (3,)
-        Position of the centre of the foot, m.
-    velocity : array (3,)
-        Its velocity, m/s.
-    force : array (3,)
-        Force of the ground on the foot, N.
-    in_contact : bool
-        Whether the foot carries load.
-    slip_velocity : array (2,)
-        Velocity of the contact point, x and y, m/s: mean of the last samples, see ``window``.
-    slip_velocity_sd : float
-        Standard deviation of each of its components, m/s. It includes that of the body's
-        velocity, which is common to all feet and lasts for about a stance.
-    slipping : bool
-        Whether the foot carries load but is not consistent with standing still, or has landed
-        less than 12 ms ago.
-    """
-
-    position: Array
-    velocity: Array
-    force: Array
-    in_contact: bool
-    slip_velocity: Array
-    slip_velocity_sd: float
-    slipping: bool
-
-
-class BodyEstimate(NamedTuple):
-    """Estimate after a sample, in odom: z up, world-fixed, at the body when estimation began.
-
-    Attributes
-    ----------
-    time : float
-        Time of the sample, s.
-    position : array (3,)
-        Position of the base, m.
-    velocity : array (3,)
-        Velocity of the base, m/s.
-    orientation : array (4,)
-        Quaternion x y z w from the base to odom.
-    covariance : array (9, 9)
-        Of position, m, rotation in odom axes, rad, and velocity, m/s.
-    feet : tuple of FootMotion
-        The feet, in the order of ``robot.legs``.
-    doubt : str
-        Why this must not be relied on: a kind, a colon, and details; empty if it may be.
-    """
-
-    time: float
-    position: Array
-    orientation: Array
-    velocity: Array
-    covariance: Array
-    feet: tuple[FootMotion, ...]
-    doubt: str
 
 
 class BodyEstimator:
@@ -217,7 +167,7 @@ class BodyEstimator:
     ...     estimate = estimator.update(
     ...         time, [0, 0, 0], [0, 0, 9.81], joints, 0 * joints, foot_forces=forces
     ...     )
-    >>> bool(np.linalg.norm(estimate.velocity) < 1e-3), [foot.slipping for foot in estimate.feet]
+    >>> bool(np.linalg.norm(estimate.velocity) < 1e-3), [foot.left_out for foot in estimate.feet]
     (True, [False, False, False, False])
     """
 
@@ -243,69 +193,64 @@ class BodyEstimator:
         if not robot.mass > 0.0:
             raise InvalidInput(f'robot {robot.name!r} is not allowed: its links have no mass')
         self._robot = robot
-        self._gyro_noise = number('gyro_noise', gyro_noise, 'rad/s', 0.0, 1.0, above=True)
-        self._accelerometer_noise = number(
-            'accelerometer_noise', accelerometer_noise, 'm/s2', 0.0, 10.0, above=True
+        self._noise = Noise(
+            number('gyro_noise', gyro_noise, 'rad/s', 0.0, 1.0, above=True),
+            number('accelerometer_noise', accelerometer_noise, 'm/s2', 0.0, 10.0, above=True),
+            number('encoder_noise', encoder_noise, 'rad', 0.0, 0.1, above=True),
+            number('velocity_noise', velocity_noise, 'rad/s', 0.0, 10.0, above=True),
+            number('force_noise', force_noise, 'N', 0.0, 1000.0),
+            number('accelerometer_bias', accelerometer_bias, 'm/s2', 0.0, 5.0),
+            number('radius_error', radius_error, '(share)', 0.0, 1.0) * robot.foot_radius,
+            number('length_error', length_error, '(share)', 0.0, 0.5),
         )
-        self._encoder_noise = number('encoder_noise', encoder_noise, 'rad', 0.0, 0.1, above=True)
-        self._velocity_noise = number(
-            'velocity_noise', velocity_noise, 'rad/s', 0.0, 10.0, above=True
-        )
-        self._force_noise = number('force_noise', force_noise, 'N', 0.0, 1000.0)
-        self._bias = number('accelerometer_bias', accelerometer_bias, 'm/s2', 0.0, 5.0)
         if contact_share is not None:
             number('contact_share', contact_share, '(share)', 0.01, 0.9)
-        self._contact_share = contact_share
         rate = number('rate', rate, 'Hz', 10.0, 10000.0)
-        self._length = number('window', window, 's', 0.0, 1.0)
-        self._samples = max(1, round(self._length * rate))
-        self._in_foot_axes = choice('force_axes', force_axes, ('base', 'foot')) == 'foot'
-        self._radius_error = number('radius_error', radius_error, '(share)', 0.0, 1.0)
-        self._late = number('joint_delay', joint_delay, 's', -0.05, 0.05)
-        self._length_error = number('length_error', length_error, '(share)', 0.0, 0.5)
-        self._rejection = rejection
-        self._to_base = np.zeros((9, 9))
-        self._to_base[:3, 6:9] = self._to_base[3:6, :3] = self._to_base[6:9, 3:6] = np.eye(3)
-        self._to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
+        length = number('window', window, 's', 0.0, 1.0)
+        self._options = Options(
+            contact_share,
+            length,
+            max(1, round(length * rate)),
+            choice('force_axes', force_axes, ('base', 'foot')) == 'foot',
+            number('joint_delay', joint_delay, 's', -0.05, 0.05),
+            rejection,
+        )
+        errors = np.zeros((9, 9))
+        errors[:3, 6:9] = errors[3:6, :3] = errors[6:9, 3:6] = np.eye(3)
+        to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
         hips = np.concatenate([robot.hips, np.ones((len(robot.legs), 1))], axis=1)
-        self._hips = (hips @ self._to_imu.T)[:, :3]
+        load = robot.mass * WEIGHT / (0.5 * len(robot.legs))
+        self._body = Body(errors, to_imu, (hips @ to_imu.T)[:, :3], load)
         self._reset()
 
     def _reset(self) -> None:
         """Discard everything."""
-        robot, legs = self._robot, len(self._robot.legs)
-        self._filter = BodyFilter(
-            legs,
-            self._gyro_noise,
-            self._accelerometer_noise,
-            GATE if self._rejection else math.inf,
+        robot, legs, noise, options = (
+            self._robot,
+            len(self._robot.legs),
+            self._noise,
+            self._options,
         )
+        gate = GATE if options.rejection else math.inf
+        self._filter = BodyFilter(legs, noise.gyro, noise.accelerometer, gate)
         self._window = SlipWindow(
-            legs, self._length, self._samples, self._encoder_noise, self._velocity_noise
+            legs, options.window, options.samples, noise.encoder, noise.velocity
         )
-        self._shift = Shift(abs(self._late))
+        self._shift = Shift(abs(options.late))
         self._time = math.nan
         self._step = 0.0  # the last one, s
-        self._measured = True  # whether forces are measured, not computed from torques
-        self._standing = np.zeros(legs, dtype=bool)
-        self._slipping = np.zeros(legs, dtype=bool)
-        self._slow_since = np.full(legs, math.inf)
-        self._patience = np.full(legs, STICKS)
-        self._spin = np.zeros((legs, 3))  # velocity of rolling for a radius of 1 m, 1/s
-        self._held = math.inf  # when a foot last stuck
-        self._sliding_since = math.inf  # since when feet stand and none of them sticks
-        self._unsure_until, self._reason = -math.inf, ''
-        self._repeats = Repeats(self._gyro_noise, self._velocity_noise)
-        self._joints = Joints(robot.joint_names)
-        self._agreement = Legs(robot)
-        self._delay = Delay(self._gyro_noise)
-        self._stretched = False  # whether legs of another length were found
-        self._look = math.nan  # when their length is looked at again
-        self._rest_since, self._rest_sum, self._rest_count = math.nan, np.zeros(3), 0
-        self._pull = WEIGHT
-        self._expected = robot.mass * WEIGHT / (0.5 * legs)
-        self._unloaded = Unloaded(robot.legs, self._expected)
-        self._climbing = np.zeros(legs)  # vertical speeds of the feet, m/s
+        self._feet = Feet(legs, STICKS)
+        self._doubts = Doubts(RECOVERY)
+        self._checks = Checks(
+            Repeats(noise.gyro, noise.velocity),
+            Joints(robot.joint_names),
+            Legs(robot),
+            Delay(noise.gyro),
+            Unloaded(robot.legs, self._body.load),
+        )
+        self._length = Length()
+        self._rests = Rest()
+        self._pull = WEIGHT  # mean size of the specific force, m/s²
 
     def update(
         self,
@@ -343,25 +288,30 @@ class BodyEstimator:
             When a reading is not finite, has another shape, or has the time of the last one; the
             estimator is then as it was before.
         """
-        time, given = self._checked(
-            time, gyro, accelerometer, joint_positions, joint_velocities, foot_forces, efforts
-        )
-        if self._late > 0.0:
+        time = number('time', time, 's', -1e12, 1e12)
+        if time == self._time:
+            raise InvalidInput(
+                f'time = {time} s is not allowed: another time than that of the last sample is'
+                ' needed'
+            )
+        readings = (gyro, accelerometer, joint_positions, joint_velocities, foot_forces, efforts)
+        given = checked(self._robot.home.shape, readings)
+        if self._options.late > 0.0:
             given[:2] = self._shift.update(time, given[:2])
-        elif self._late < 0.0:
+        elif self._options.late < 0.0:
             given[2:] = self._shift.update(time, given[2:])
         gyro, accelerometer, q, dq = given[:4]
-        kinematics = self._robot.chains.solve(q, self._to_imu)
+        kinematics = self._robot.chains.solve(q, self._body.to_imu)
         forces = self._forces(time, kinematics, accelerometer, foot_forces is not None, given[4])
         if time < self._time:
             self._reset()
-            self._doubt_for(time, 'clock: time went back, odom begins anew')
+            self._doubts.add(time, 'clock: time went back, odom begins anew')
         if math.isnan(self._time):
             self._begin(time, gyro, accelerometer, dq)
-        contradiction = self._repeats.update(time, gyro, accelerometer, q, dq, forces)
-        contradiction = self._joints.update(time, time - self._time, q, dq) or contradiction
+        contradiction = self._checks.repeats.update(time, gyro, accelerometer, q, dq, forces)
+        contradiction = self._checks.joints.update(time, time - self._time, q, dq) or contradiction
         if contradiction:
-            self._doubt_for(time, contradiction)
+            self._doubts.add(time, contradiction)
             if contradiction.startswith('imu'):
                 self._filter.lose(BLIND_TURN)
         dt = self._advance(time, gyro, accelerometer)
@@ -373,7 +323,7 @@ class BodyEstimator:
 
         It is apart from ``joint_delay``, and NaN before it is known.
         """
-        return self._delay.value, self._delay.deviation
+        return self._checks.delay.value, self._checks.delay.deviation
 
     @property
     def foot_radius(self) -> tuple[float, float]:
@@ -384,50 +334,6 @@ class BodyEstimator:
     def length_error(self) -> tuple[float, float]:
         """Relative error of the length of the legs, as estimated, and its standard deviation."""
         return self._filter.scale, self._filter.deviations[1]
-
-    def _checked(self, time: float, *readings: npt.ArrayLike | None) -> tuple[float, list[Array]]:
-        """Return time and readings as arrays; raise `InvalidInput` for those not allowed."""
-        time = number('time', time, 's', -1e12, 1e12)
-        if time == self._time:
-            raise InvalidInput(
-                f'time = {time} s is not allowed: another time than that of the last sample is'
-                ' needed'
-            )
-        foot_forces = readings[4]
-        joints = self._robot.home.shape
-        size = (joints[0] * joints[1],)
-        names = (
-            ('gyro', (3,), 'rad/s', 1e3),
-            ('accelerometer', (3,), 'm/s2', 1e4),
-            ('joint_positions', size, 'rad', 1e4),
-            ('joint_velocities', size, 'rad/s', 1e4),
-            ('foot_forces', (joints[0], 3), 'N', 1e6),
-            ('efforts', size, 'N m', 1e6),
-        )
-        # The last two may be missing.
-        given: list[tuple[tuple[str, tuple[int, ...], str, float], Any]] = [
-            (names[place], reading)
-            for place, reading in enumerate(readings)
-            if reading is not None or place < 4
-        ]
-        # One look at all of them is enough if they are fine; NaN is not below the limit.
-        if not (
-            all(
-                isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape
-                for (_, shape, _, _), values in given
-            )
-            and np.abs(np.concatenate([np.ravel(values) for _, values in given])).max() < 1e3
-        ):
-            for (name, shape, unit, most), values in given:
-                found = quantity(name, values, unit, -most, most)
-                if found.shape != shape:
-                    raise InvalidInput(
-                        f'{name} of shape {found.shape} is not allowed: {shape} is needed'
-                    )
-        arrays = [np.asarray(values, dtype=float) for _, values in given]
-        for index in (2, 3) if foot_forces is not None else (2, 3, 4)[: len(arrays) - 2]:
-            arrays[index] = arrays[index].reshape(joints)
-        return time, [*arrays, _NONE]
 
     def _forces(
         self,
@@ -440,10 +346,10 @@ class BodyEstimator:
         """Return the forces on the feet, (legs, 3), N, in IMU axes, or None."""
         if not given.size:
             return None
-        self._measured = measured
+        self._feet.measured = measured
         if measured:
-            given = self._unloaded.update(time, given, self._climbing)
-            if self._in_foot_axes:
+            given = self._checks.unloaded.update(time, given, self._feet.climbing)
+            if self._options.in_foot_axes:
                 return np.asarray((kinematics.rotations @ given[..., None])[..., 0])
             return np.asarray(given @ self._robot.imu[:3, :3])
         # The specific force has weight and inertia of the legs in one, as far as they move with
@@ -458,15 +364,15 @@ class BodyEstimator:
         strength = math.sqrt(accelerometer @ accelerometer)
         calm = (
             abs(strength - WEIGHT) < 0.5
-            and np.abs(gyro).max() < 0.05 + 4.0 * self._gyro_noise
-            and np.abs(dq).max() < 0.05 + 4.0 * self._velocity_noise
+            and np.abs(gyro).max() < 0.05 + 4.0 * self._noise.gyro
+            and np.abs(dq).max() < 0.05 + 4.0 * self._noise.velocity
         )
-        tilt = math.hypot(self._accelerometer_noise, self._bias) / WEIGHT
+        tilt = math.hypot(self._noise.accelerometer, self._noise.bias) / WEIGHT
         body = self._filter
         body.spread(
             *((tilt + 2e-3, 0.02) if calm else (0.2, 0.5)),
-            *(UNKNOWN_BIAS, max(self._bias, 1e-3)),
-            *(self._radius_error * self._robot.foot_radius, self._length_error),
+            *(UNKNOWN_BIAS, max(self._noise.bias, 1e-3)),
+            *(self._noise.radius, self._noise.length),
         )
         body.radius = self._robot.foot_radius
         # The least rotation that turns the reading of the IMU upright, then the base to x.
@@ -478,36 +384,33 @@ class BodyEstimator:
         heading = math.atan2(turn[1, 0], turn[0, 0])
         turn = rotation((0.0, 0.0, -heading)) @ turn
         body.turn = turn @ self._robot.imu[:3, :3]
-        body.position = -body.turn @ self._to_imu[:3, 3]
-        self._time = self._held = self._sliding_since = time
-        if not calm and time >= self._unsure_until:
-            self._doubt_for(time, 'start: the robot may be moving')
-
-    def _doubt_for(self, time: float, reason: str) -> None:
-        self._unsure_until, self._reason = time + RECOVERY, reason
+        body.position = -body.turn @ self._body.to_imu[:3, 3]
+        self._time = self._feet.held = self._feet.sliding_since = time
+        if not calm and time >= self._doubts.until:
+            self._doubts.add(time, 'start: the robot may be moving')
 
     def _advance(self, time: float, gyro: Array, accelerometer: Array) -> float:
         """Advance the filter to the time of the readings; return the step, s, 0 after a gap."""
         dt, before, self._time = time - self._time, self._step, time
         self._step = dt
         if dt > LONGEST_GAP:
-            self._doubt_for(time, f'gap: no readings for {dt:.2g} s')
+            self._doubts.add(time, f'gap: no readings for {dt:.2g} s')
             self._filter.lose(BLIND_TURN)
         elif dt > LONGEST_STEP:
             self._filter.lose(BLIND_RATE * dt, BLIND_ACCELERATION * dt)
             if before > LONGEST_STEP:  # no foot keeps its foothold
-                self._doubt_for(
+                self._doubts.add(
                     time,
                     f'rate: readings are {dt:.2g} s apart, {LONGEST_STEP} s at most are needed',
                 )
         if dt > LONGEST_STEP:
-            self._sliding_since = time
-            self._standing[:] = False  # their footholds are made anew
-        self._spin[~self._standing] = 0.0
+            self._feet.sliding_since = time
+            self._feet.standing[:] = False  # their footholds are made anew
+        self._feet.spin[~self._feet.standing] = 0.0
         # What happened in a gap is unknown: the body is taken to have stood.
         step = dt if dt <= LONGEST_GAP else 0.0
-        mean = self._filter.predict(step, gyro, accelerometer, self._spin)
-        self._moved = step * (mean - self._filter.radius * self._spin)
+        mean = self._filter.predict(step, gyro, accelerometer, self._feet.spin)
+        self._feet.moved = step * (mean - self._filter.radius * self._feet.spin)
         # One reading after a gap says nothing about the time without readings.
         self._pull += (math.sqrt(accelerometer @ accelerometer) - self._pull) * step
         return step
@@ -523,20 +426,20 @@ class BodyEstimator:
         forces: Array | None,
     ) -> BodyEstimate:
         """Correct the filter with the feet, and return the estimate."""
-        body, legs = self._filter, len(self._standing)
+        body, legs = self._filter, len(self._feet.standing)
         lands = self._load(kinematics, forces, time)
         turn = body.turn
         places, hips = self._placed(kinematics, turn)
         lines = turn @ kinematics.jacobians
         squares = lines @ lines.transpose(0, 2, 1)
-        noise = self._encoder_noise**2 * squares + FOOT_NOISE**2 * np.eye(3)
+        noise = self._noise.encoder**2 * squares + FOOT_NOISE**2 * np.eye(3)
         body.set_down(lands, places, hips, noise)
-        if self._standing.any():
-            fixed = not self._agreement.agree or bool(
-                np.abs(dq).max() < 0.02 + 5.0 * self._velocity_noise
+        if self._feet.standing.any():
+            fixed = not self._checks.legs.agree or bool(
+                np.abs(dq).max() < 0.02 + 5.0 * self._noise.velocity
             )
-            trusted = self._standing & ~self._agreement.against
-            body.stand(places, hips, noise, trusted, self._slipping, fixed)
+            trusted = self._feet.standing & ~self._checks.legs.against
+            body.stand(places, hips, noise, trusted, self._feet.left_out, fixed)
         if not body.sound():
             return self._anew(time, gyro, accelerometer, kinematics, dq, forces)
         self._rest(time, gyro, dq)
@@ -548,11 +451,11 @@ class BodyEstimator:
         swaying += (places @ turn) @ skew(rate).T
         moving, turning = (np.concatenate([swaying, turning]) @ turn.T).reshape(2, legs, 3)
         velocities = body.velocity + moving
-        self._climbing = velocities[:, 2]
-        self._spin = np.stack([turning[:, 1], -turning[:, 0], np.zeros(legs)], axis=1)
-        slips = velocities - body.radius * self._spin
+        self._feet.climbing = velocities[:, 2]
+        self._feet.spin = np.stack([turning[:, 1], -turning[:, 0], np.zeros(legs)], axis=1)
+        slips = velocities - body.radius * self._feet.spin
         window = self._window
-        window.update(time, self._moved, places, slips, lands)
+        window.update(time, self._feet.moved, places, slips, lands)
         variance = body.covariance
         common = 0.5 * (variance[3, 3] + variance[4, 4])
         lever = 0.5 * (squares[:, 0, 0] + squares[:, 1, 1])
@@ -561,16 +464,18 @@ class BodyEstimator:
         latest = np.sqrt(window.latest_noise**2 * lever + common)
         self._judge(time, window.velocity, deviations, latest, (places, hips, noise))
         speeds = np.hypot(window.velocity[:, 0], window.velocity[:, 1])
-        self._delay.update(time, turn @ rate, places, slips, self._standing & (speeds < CALM))
+        self._checks.delay.update(
+            time, turn @ rate, places, slips, self._feet.standing & (speeds < CALM)
+        )
         moves = np.hypot(moving[:, 0], moving[:, 1])
         if self._compare(time, dt, speeds, moves):
-            body.set_down(self._standing, places, hips, noise)
+            body.set_down(self._feet.standing, places, hips, noise)
         deviations = np.sqrt(np.maximum(white, UNSTEADY * window.unsteady) + common)
         return self._estimate(time, rate, places, velocities, forces, deviations)
 
     def _placed(self, kinematics: Kinematics, turn: Array) -> tuple[Array, Array]:
         """Return feet and hips from the IMU, (legs, 3), m, in odom axes."""
-        hips = self._hips @ turn.T
+        hips = self._body.hips @ turn.T
         places = kinematics.positions @ turn.T
         return places + self._filter.scale * (places - hips), hips
 
@@ -578,27 +483,27 @@ class BodyEstimator:
         """Begin anew after readings that no robot can have made."""
         self._reset()
         self._begin(time, readings[0], readings[1], readings[3])
-        self._doubt_for(time, 'diverged: odom begins anew')
+        self._doubts.add(time, 'diverged: odom begins anew')
         self._advance(time, readings[0], readings[1])
         return self._process(time, 0.0, *readings)
 
     def _load(self, kinematics: Kinematics, forces: Array | None, time: float) -> Flags:
         """Update which feet stand; return those that landed with this sample."""
-        before = self._standing
+        before = self._feet.standing
         if forces is None:
-            self._standing = np.zeros_like(before)
-            self._doubt_for(time, 'force: neither foot forces nor efforts')
-            return self._standing
+            self._feet.standing = np.zeros_like(before)
+            self._doubts.add(time, 'force: neither foot forces nor efforts')
+            return self._feet.standing
         loads = forces @ self._filter.turn[2]
-        share = self._contact_share or (0.1 if self._measured else 0.25)
-        gate = share * self._expected
-        self._standing = loads > np.where(before, gate, gate + 3.0 * self._force_noise)
-        lands = self._standing & ~before
-        self._slipping &= self._standing
-        if self._rejection:
-            self._slipping |= lands
-            self._patience[lands] = SETTLES
-            self._slow_since[lands] = math.inf
+        share = self._options.contact_share or (0.1 if self._feet.measured else 0.25)
+        gate = share * self._body.load
+        self._feet.standing = loads > np.where(before, gate, gate + 3.0 * self._noise.force)
+        lands = self._feet.standing & ~before
+        self._feet.left_out &= self._feet.standing
+        if self._options.rejection:
+            self._feet.left_out |= lands
+            self._feet.patience[lands] = SETTLES
+            self._feet.slow_since[lands] = math.inf
         return lands
 
     def _judge(
@@ -610,70 +515,72 @@ class BodyEstimator:
         feet: tuple[Array, Array, Array],
     ) -> None:
         """Update which feet slip: those that slip have a foothold only in height."""
-        if not self._rejection:
+        if not self._options.rejection:
             return
         speeds = np.hypot(slips[:, 0], slips[:, 1])
-        fresh = self._standing & ~self._slipping
+        fresh = self._feet.standing & ~self._feet.left_out
         fresh &= self._filter.rejected | (speeds > FAST * deviations)
-        self._patience[fresh] = STICKS
+        self._feet.patience[fresh] = STICKS
         now = self._window.latest
-        slow = self._standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < SLOW * latest)
-        self._slow_since = np.where(slow, np.minimum(self._slow_since, time), math.inf)
-        self._slipping |= fresh
-        self._slipping &= ~(time - self._slow_since >= self._patience)
+        slow = self._feet.standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < SLOW * latest)
+        self._feet.slow_since = np.where(slow, np.minimum(self._feet.slow_since, time), math.inf)
+        self._feet.left_out |= fresh
+        self._feet.left_out &= ~(time - self._feet.slow_since >= self._feet.patience)
         lifted = self._filter.lifted
-        if self._slipping.any():
-            self._filter.set_down(self._slipping & ~lifted, *feet, level=True)
+        if self._feet.left_out.any():
+            self._filter.set_down(self._feet.left_out & ~lifted, *feet, level=True)
         if lifted.any():
             self._filter.set_down(lifted, *feet)
-        sticking = self._standing & ~self._slipping
+        sticking = self._feet.standing & ~self._feet.left_out
         if sticking.any():
-            self._held = time
-        if sticking.any() or not self._standing.any():
-            self._sliding_since = time
-        elif time - self._sliding_since > LOST and self._standing.sum() > 1:
-            self._regain(time, slips[self._standing])
+            self._feet.held = time
+        if sticking.any() or not self._feet.standing.any():
+            self._feet.sliding_since = time
+        elif time - self._feet.sliding_since > LOST and self._feet.standing.sum() > 1:
+            self._regain(time, slips[self._feet.standing])
 
     def _regain(self, time: float, slips: Array) -> None:
         """Take feet to stick that all slip alike for long: more likely the velocity is wrong."""
         if np.ptp(slips[:, :2], axis=0).max() < ALIKE:
             self._filter.lose()
-            self._slipping[:] = False
-            self._held = self._sliding_since = time
-            self._doubt_for(time, 'slipping: all feet slipped alike, velocity is estimated anew')
+            self._feet.left_out[:] = False
+            self._feet.held = self._feet.sliding_since = time
+            self._doubts.add(time, 'slipping: all feet slipped alike, velocity is estimated anew')
 
     def _compare(self, time: float, dt: float, slips: Array, moves: Array) -> bool:
         """Compare the legs with each other, and their length with that of the robot's file.
 
         Return whether what was learnt about them was discarded.
         """
-        radius = self._radius_error * self._robot.foot_radius
-        changed = self._agreement.update(dt, self._standing, self._slipping, slips, moves)
-        if changed or self._unloaded.found:
+        radius = self._noise.radius
+        changed = self._checks.legs.update(
+            dt, self._feet.standing, self._feet.left_out, slips, moves
+        )
+        if changed or self._checks.unloaded.found:
             # What such legs, or feet that were in the air, have shown is wrong.
-            self._filter.reshape(self._robot.foot_radius, radius, 0.0, self._length_error)
+            self._filter.reshape(self._robot.foot_radius, radius, 0.0, self._noise.length)
             return True
-        self._filter.creep = CREEP * self._agreement.slippery
+        self._filter.creep = CREEP * self._checks.legs.slippery
         # Joints that are late look like legs of another length, too.
-        if not time < self._look and not self._delay.doubt():
-            self._look = time + LOOK
+        if not time < self._length.look and not self._checks.delay.doubt():
+            self._length.look = time + LOOK
             scale, deviation = self._filter.scale, self._filter.deviations[1]
-            learnt = self._length_error**2 - deviation**2
-            if self._stretched:
+            learnt = self._noise.length**2 - deviation**2
+            if self._length.stretched:
                 if deviation > KNOWN_LENGTH:
-                    self._doubt_for(
+                    self._doubts.add(
                         time,
                         'kinematics: legs seem to be longer or shorter than in the file of the'
                         f' robot, by {100.0 * scale:.0f} +- {100.0 * deviation:.0f} %',
                     )
             # Feet that slip for most of their stances look like legs of another length.
             elif (
-                self._agreement.sticks
-                and learnt > LEARNT * self._length_error**2
+                self._checks.legs.sticks
+                and learnt > LEARNT * self._noise.length**2
                 and abs(scale)
-                > max(WRONG_LENGTH * learnt / self._length_error**2, 4.0 * math.sqrt(learnt))
+                > max(WRONG_LENGTH * learnt / self._noise.length**2, 4.0 * math.sqrt(learnt))
             ):
-                self._stretched = True
+                self._length.stretched = True
                 self._filter.reshape(self._robot.foot_radius, radius, 0.0, UNKNOWN_LENGTH)
                 return True
         return False
@@ -681,19 +588,19 @@ class BodyEstimator:
     def _rest(self, time: float, gyro: Array, dq: Array) -> None:
         """Average the gyro while nothing moves, and correct its bias."""
         still = bool(
-            self._standing.all()
-            and np.abs(dq).max() < 0.02 + 5.0 * self._velocity_noise
+            self._feet.standing.all()
+            and np.abs(dq).max() < 0.02 + 5.0 * self._noise.velocity
             and np.abs(gyro - self._filter.gyro_bias).max()
-            < 0.02 + 5.0 * self._gyro_noise + 3.0 * math.sqrt(self._filter.covariance[9, 9])
+            < 0.02 + 5.0 * self._noise.gyro + 3.0 * math.sqrt(self._filter.covariance[9, 9])
         )
-        if not still or self._rest_count == 0:
-            self._rest_since, self._rest_sum, self._rest_count = time, np.zeros(3), 0
+        if not still or self._rests.count == 0:
+            self._rests.since, self._rests.total, self._rests.count = time, np.zeros(3), 0
         if still:
-            self._rest_sum, self._rest_count = self._rest_sum + gyro, self._rest_count + 1
-            if time - self._rest_since >= REST_TIME:
-                noise = math.hypot(self._gyro_noise / math.sqrt(self._rest_count), BIAS_FLOOR)
-                self._filter.rest(self._rest_sum / self._rest_count, noise)
-                self._rest_count = 0
+            self._rests.total, self._rests.count = self._rests.total + gyro, self._rests.count + 1
+            if time - self._rests.since >= REST_TIME:
+                noise = math.hypot(self._noise.gyro / math.sqrt(self._rests.count), BIAS_FLOOR)
+                self._filter.rest(self._rests.total / self._rests.count, noise)
+                self._rests.count = 0
 
     def _estimate(
         self,
@@ -706,8 +613,8 @@ class BodyEstimator:
     ) -> BodyEstimate:
         body = self._filter
         turn = body.turn
-        arm = turn @ self._to_imu[:3, 3]
-        to_odom = turn @ self._to_imu[:3, :3]
+        arm = turn @ self._body.to_imu[:3, 3]
+        to_odom = turn @ self._body.to_imu[:3, :3]
         centres = places + body.position
         loads = np.zeros_like(places) if forces is None else forces @ turn.T
         slips = self._window.velocity[:, :2]
@@ -717,15 +624,15 @@ class BodyEstimator:
                 centres,
                 velocities,
                 loads,
-                self._standing.tolist(),
+                self._feet.standing.tolist(),
                 slips,
                 deviations.tolist(),
-                (self._standing & self._slipping).tolist(),
+                (self._feet.standing & self._feet.left_out).tolist(),
             )
         )
-        velocity = body.velocity + turn @ cross(rate, self._to_imu[:3, 3])
+        velocity = body.velocity + turn @ cross(rate, self._body.to_imu[:3, 3])
         # From the filter's errors to those of the base: rotation moves it about the IMU.
-        step = self._to_base
+        step = self._body.errors
         step[:3, :3] = -skew(arm)
         step[6:9, :3] = -skew(velocity)
         covariance = step @ body.covariance[:9, :9] @ step.T
@@ -740,15 +647,15 @@ class BodyEstimator:
         )
 
     def _doubt(self, time: float) -> str:
-        if time < self._unsure_until:
-            return self._reason
+        if time < self._doubts.until:
+            return self._doubts.reason
         if abs(self._pull - WEIGHT) > 1.0:
             return f'gravity: the accelerometer shows {self._pull:.2g} m/s2 on average'
-        for readings in (self._agreement, self._delay, self._unloaded):
+        for readings in (self._checks.legs, self._checks.delay, self._checks.unloaded):
             if doubt := readings.doubt():
                 return doubt
-        if time - self._held > RECOVERY:
-            if self._standing.any():
+        if time - self._feet.held > RECOVERY:
+            if self._feet.standing.any():
                 return 'slipping: all feet that stand may slip'
             return 'no contact: no foot stands'
         return ''

@@ -52,15 +52,14 @@ class SlipWindow:
         self.unsteady = np.zeros(legs)
         self._positions, self._velocities = 2.0 * encoder_noise**2, velocity_noise**2
         self._lengths = length, SHORT * length
-        self._legs = np.arange(legs)
         self._begins = np.zeros(legs, dtype=np.int64)  # count at which the window began
-        self._size = samples + 1
+        size = samples + 1
         self._count = 0
         self._firsts = [0, 0]  # counts of the first samples within the lengths
         self._path = np.zeros((legs, 3))
         self._sums = np.zeros((legs, 3, 3))  # place over the ground; velocities; their squares
-        self._ring = np.zeros((self._size, legs, 3, 3))
-        self._times = np.full(self._size, -math.inf)
+        self._ring = np.zeros((size, legs, 3, 3))
+        self._times = np.full(size, -math.inf)
 
     def update(
         self,
@@ -86,7 +85,8 @@ class SlipWindow:
             Feet whose window begins with this sample.
         """
         self._count += 1
-        now = self._count % self._size
+        size = len(self._times)
+        now = self._count % size
         self._path += moved
         self._sums[:, 0] = self._path + places
         self._sums[:, 1] += slip
@@ -94,8 +94,8 @@ class SlipWindow:
         self._ring[now], self._times[now] = self._sums, time
         self._begins[begins] = self._count
         for index, length in enumerate(self._lengths):
-            first = max(self._firsts[index], self._count - self._size + 1)
-            while time - self._times[first % self._size] > 1.001 * length:  # but for rounding
+            first = max(self._firsts[index], self._count - size + 1)
+            while time - self._times[first % size] > 1.001 * length:  # but for rounding
                 first += 1
             self._firsts[index] = first
         self._average(time, slip)
@@ -103,8 +103,10 @@ class SlipWindow:
     def _average(self, time: float, slip: Array) -> None:
         """Take the means over both windows, the longer one first."""
         firsts = np.maximum(self._begins, np.array(self._firsts)[:, None])  # (2, legs)
-        rows = firsts % self._size
-        change, total, squares = (self._sums - self._ring[rows, self._legs]).transpose(2, 0, 1, 3)
+        rows = firsts % len(self._times)
+        change, total, squares = (
+            self._sums - self._ring[rows, np.arange(len(self._begins))]
+        ).transpose(2, 0, 1, 3)
         length = (time - self._times[rows])[..., None]
         count = (self._count - firsts)[..., None]
         weight = length / self._positions

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -239,6 +240,31 @@ class _Force(NamedTuple):
     force: Array
 
 
+class _Outputs(NamedTuple):
+    estimate: Callable[[int, BodyEstimate], None]
+    doubt: Callable[[str], None]
+    error: Callable[[InvalidInput], None]
+
+
+@dataclass
+class _Start:
+    """Readings before the first sample."""
+
+    calm: int = 0  # in a row
+    first_ns: float = math.inf  # stamp of the first sample that could be used
+
+
+@dataclass
+class _Since:
+    """What has come since the last sample."""
+
+    silent_ns: int | None = None  # when that was noted first
+    rejection: str = ''
+    unpaired_ns: float = math.inf  # stamp of the first joints without partner
+    received: Counter[str] = field(default_factory=Counter)  # readings, by source
+    fresh: Counter[str] = field(default_factory=Counter)  # of those, how many had a new stamp
+
+
 class SensingStage:
     """Pair readings of IMU, joints and feet by their time stamps, and estimate the robot's motion.
 
@@ -296,28 +322,19 @@ class SensingStage:
         forces: str = 'auto',
     ) -> None:
         self.estimator = estimator
-        self._legs, self._size = len(robot.legs), len(robot.joint_names)
-        self._emit, self._emit_doubt, self._reject = emit, emit_doubt, reject
+        self._robot = robot
+        self._out = _Outputs(emit, emit_doubt, reject)
         self._source = choice('forces', forces, FORCES)
         self.samples = self.last_ns = 0
         self.doubt: str | None = None
         self.differentiates = False
         self.force_source = ''
-        self._rejection = ''
-        self._silent_since_ns: int | None = None
-        self._begin()
-
-    def _begin(self) -> None:
-        """Discard all readings."""
         self._inertial: deque[_Inertial] = deque(maxlen=_WAITING)
         self._waiting: deque[_Joints] = deque(maxlen=_WAITING)
         self._last_positions: tuple[int, Array] | None = None
-        self._forces: list[deque[_Force]] = [deque(maxlen=_WAITING) for _ in range(self._legs)]
-        self._calm = 0  # readings in a row
-        self._first_ns: float = math.inf  # stamp of the first sample that could be used
-        self._unpaired_ns: float = math.inf  # stamp of the first joints without partner since then
-        self._received: Counter[str] = Counter()  # readings since the last sample, by source
-        self._fresh: Counter[str] = Counter()  # of those, how many had a new stamp
+        self._forces: list[deque[_Force]] = [deque(maxlen=_WAITING) for _ in robot.legs]
+        self._start = _Start()
+        self._since = _Since()
 
     def imu(self, stamp_ns: int, gyro: npt.ArrayLike, accelerometer: npt.ArrayLike) -> None:
         """Process a reading of the IMU.
@@ -340,13 +357,13 @@ class SensingStage:
         except InvalidInput as error:
             self.reject(error)
             return
-        self._received['IMU'] += 1
+        self._since.received['IMU'] += 1
         last = self._inertial[-1].stamp_ns if self._inertial else -math.inf
         if stamp_ns <= last:
             if stamp_ns > last - SET_BACK_NS:
                 return  # it came twice, or late
             self._inertial.clear()
-        self._fresh['IMU'] += 1
+        self._since.fresh['IMU'] += 1
         self._inertial.append(reading)
         self._process()
 
@@ -370,25 +387,26 @@ class SensingStage:
         efforts : array (joints,) or None
             Torques, N m.
         """
+        size = len(self._robot.joint_names)
         try:
-            q = _checked('joint positions', positions, self._size, 'rad')
+            q = _checked('joint positions', positions, size, 'rad')
             dq = None
             if velocities is not None:
-                dq = _checked('joint velocities', velocities, self._size, 'rad/s')
+                dq = _checked('joint velocities', velocities, size, 'rad/s')
             torques = None
             if efforts is not None:
-                torques = _checked('efforts', efforts, self._size, 'N m')
+                torques = _checked('efforts', efforts, size, 'N m')
         except InvalidInput as error:
             self.reject(error)
             return
-        self._received['joints'] += 1
+        self._since.received['joints'] += 1
         last_ns, before = self._last_positions or (stamp_ns - 1, q)
         if stamp_ns <= last_ns:
             if stamp_ns > last_ns - SET_BACK_NS:
                 return
             self._waiting.clear()
             before = q
-        self._fresh['joints'] += 1
+        self._since.fresh['joints'] += 1
         self.differentiates = dq is None
         if dq is None:
             dt = (stamp_ns - last_ns) * 1e-9
@@ -433,8 +451,8 @@ class SensingStage:
         error : InvalidInput
             Why the reading is not used.
         """
-        self._rejection = str(error)
-        self._reject(error)
+        self._since.rejection = str(error)
+        self._out.error(error)
 
     def tick(self, now_ns: int) -> None:
         """Check whether readings are missing; call it every `TICK_PERIOD_NS`.
@@ -444,21 +462,21 @@ class SensingStage:
         now_ns : int
             Time on the clock of the readings, ns.
         """
-        if self._silent_since_ns is None:
-            self._silent_since_ns = now_ns
+        if self._since.silent_ns is None:
+            self._since.silent_ns = now_ns
             return
-        silence = (now_ns - self._silent_since_ns) * 1e-9
+        silence = (now_ns - self._since.silent_ns) * 1e-9
         if silence > SILENCE:
             self._update_doubt(self._missing(silence))
 
     def _missing(self, silence: float) -> str:
-        missing = [f'no {each}' for each in ('IMU', 'joints') if each not in self._received]
-        if missing and not self._rejection:
+        missing = [f'no {each}' for each in ('IMU', 'joints') if each not in self._since.received]
+        if missing and not self._since.rejection:
             return f'{" and ".join(missing)}: for {silence:.1f} s'
-        if self._rejection:
-            return f'reading refused: {self._rejection}'
+        if self._since.rejection:
+            return f'reading refused: {self._since.rejection}'
         for source in ('IMU', 'joints'):
-            if self._fresh[source] < 2 < self._received[source]:
+            if self._since.fresh[source] < 2 < self._since.received[source]:
                 return f'stamps: those of the {source} do not advance'
         if not self._waiting and self.differentiates:
             return f'no joints: no two readings in {LONGEST_DIFFERENCE:g} s, without velocities'
@@ -479,9 +497,9 @@ class SensingStage:
                 if last_ns < joints.stamp_ns and len(self._waiting) < _WAITING:
                     return  # the IMU may be late
                 self._waiting.popleft()
-                self._unpaired_ns = min(self._unpaired_ns, joints.stamp_ns)
+                self._since.unpaired_ns = min(self._since.unpaired_ns, joints.stamp_ns)
                 # After a silence of the IMU a few readings of joints have no partner.
-                if joints.stamp_ns - self._unpaired_ns > 2 * _LATEST_NS:
+                if joints.stamp_ns - self._since.unpaired_ns > 2 * _LATEST_NS:
                     self._update_doubt(self._apart(joints.stamp_ns))
                 continue
             if not self._has_forces(joints.stamp_ns) and len(self._waiting) == 1:
@@ -520,7 +538,7 @@ class SensingStage:
             if force is None or force.stamp_ns < stamp_ns - OLDEST_FORCE_NS:
                 early = kept[0].stamp_ns - stamp_ns if kept else 0
                 if early > OLDEST_FORCE_NS:
-                    self._reject(
+                    self._out.error(
                         InvalidInput(
                             f'foot force: its stamp is {early * 1e-6:.3g} ms after that of the'
                             f' joints: at most {SAME_NS * 1e-6:g} ms is allowed'
@@ -535,9 +553,9 @@ class SensingStage:
         pull = abs(math.sqrt(inertial.accelerometer @ inertial.accelerometer) - WEIGHT)
         calm = pull < _CALM_PULL and np.abs(inertial.gyro).max() < _CALM_RATE
         calm = calm and np.abs(joints.velocities).max() < _CALM_JOINTS
-        self._calm = self._calm + 1 if calm else 0
-        self._first_ns = min(self._first_ns, joints.stamp_ns)
-        return self._calm >= CALM or joints.stamp_ns - self._first_ns >= START * 1e9
+        self._start.calm = self._start.calm + 1 if calm else 0
+        self._start.first_ns = min(self._start.first_ns, joints.stamp_ns)
+        return self._start.calm >= CALM or joints.stamp_ns - self._start.first_ns >= START * 1e9
 
     def _update(self, joints: _Joints, inertial: _Inertial) -> None:
         """Process a sample."""
@@ -566,18 +584,15 @@ class SensingStage:
             return
         self.samples += 1
         self.last_ns = stamp_ns
-        self._silent_since_ns, self._rejection = None, ''
-        self._received.clear()
-        self._fresh.clear()
-        self._unpaired_ns = math.inf
+        self._since = _Since()
         self._update_doubt(estimate.doubt)
-        self._emit(stamp_ns, estimate)
+        self._out.estimate(stamp_ns, estimate)
 
     def _update_doubt(self, doubt: str) -> None:
         before, self.doubt = self.doubt, doubt
         # Details, after the colon, may change with every sample.
         if before is None or doubt.partition(':')[0] != before.partition(':')[0]:
-            self._emit_doubt(doubt)
+            self._out.doubt(doubt)
 
 
 def _between(before: _Inertial, after: _Inertial, stamp_ns: int) -> _Inertial | None:

@@ -76,7 +76,7 @@ def estimated(robot: Robot, log: Log, course: Course, **arguments: Any) -> Track
         slip_deviation=np.array([[foot.slip_velocity_sd for foot in row] for row in feet]),
         standing=np.array([[foot.in_contact for foot in row] for row in feet]),
         force=np.array([[foot.force for foot in row] for row in feet]),
-        slipping=np.array([[foot.slipping for foot in row] for row in feet]),
+        slipping=np.array([[foot.left_out for foot in row] for row in feet]),
         doubt=np.array([bool(each.doubt) for each in found]),
         seconds=seconds,
     )

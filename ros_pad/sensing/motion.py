@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a body estimator is given, keeps and returns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.configuration import quantity
+from ros_pad.errors import InvalidInput
+from ros_pad.robots.rotation import Array
+from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
+
+_NONE = np.zeros(0)
+
+
+class FootMotion(NamedTuple):
+    """One foot after a sample; all vectors in odom axes.
+
+    Attributes
+    ----------
+    position : array (3,)
+        Position of the centre of the foot, m.
+    velocity : array (3,)
+        Its velocity, m/s.
+    force : array (3,)
+        Force of the ground on the foot, N.
+    in_contact : bool
+        Whether the foot carries load.
+    slip_velocity : array (2,)
+        Velocity of the contact point, x and y, m/s: mean of the last samples, see ``window``.
+    slip_velocity_sd : float
+        Standard deviation of each of its components, m/s. It includes that of the body's
+        velocity, which is common to all feet and lasts for about a stance.
+    left_out : bool
+        Whether the foot carries load but is left out of the estimate of the body, but for its
+        height: it is not consistent with standing still, or has landed less than 12 ms ago.
+    """
+
+    position: Array
+    velocity: Array
+    force: Array
+    in_contact: bool
+    slip_velocity: Array
+    slip_velocity_sd: float
+    left_out: bool
+
+
+class BodyEstimate(NamedTuple):
+    """Estimate after a sample, in odom: z up, world-fixed, at the body when estimation began.
+
+    Attributes
+    ----------
+    time : float
+        Time of the sample, s.
+    position : array (3,)
+        Position of the base, m.
+    velocity : array (3,)
+        Velocity of the base, m/s.
+    orientation : array (4,)
+        Quaternion x y z w from the base to odom.
+    covariance : array (9, 9)
+        Of position, m, rotation in odom axes, rad, and velocity, m/s.
+    feet : tuple of FootMotion
+        The feet, in the order of ``robot.legs``.
+    doubt : str
+        Why this must not be relied on: a kind, a colon, and details; empty if it may be.
+    """
+
+    time: float
+    position: Array
+    orientation: Array
+    velocity: Array
+    covariance: Array
+    feet: tuple[FootMotion, ...]
+    doubt: str
+
+
+class Noise(NamedTuple):
+    """Standard deviations of single readings, and of what is known of the robot; SI units."""
+
+    gyro: float
+    accelerometer: float
+    encoder: float
+    velocity: float
+    force: float
+    bias: float  # of the accelerometer
+    radius: float  # with which feet roll
+    length: float  # of the legs, relative
+
+
+class Options(NamedTuple):
+    """How readings are used."""
+
+    contact_share: float | None
+    window: float  # s
+    samples: int  # in a window
+    in_foot_axes: bool
+    late: float  # s, delay of the joints
+    rejection: bool
+
+
+class Body(NamedTuple):
+    """Where things are in the body."""
+
+    errors: Array  # (9, 9): from errors of the filter to those of the base
+    to_imu: Array  # (4, 4)
+    hips: Array  # (legs, 3), from the IMU, m
+    load: float  # N, that a foot is expected to carry
+
+
+class Checks(NamedTuple):
+    """What finds readings that contradict each other."""
+
+    repeats: Repeats
+    joints: Joints
+    legs: Legs
+    delay: Delay
+    unloaded: Unloaded
+
+
+class Feet:
+    """What is known of the contacts of all feet."""
+
+    def __init__(self, legs: int, patience: float) -> None:
+        self.measured = True  # whether forces are measured, not computed from torques
+        self.standing = np.zeros(legs, dtype=bool)
+        self.left_out = np.zeros(legs, dtype=bool)  # of the filter, but for their height
+        self.slow_since = np.full(legs, math.inf)
+        self.patience = np.full(legs, patience)
+        self.spin = np.zeros((legs, 3))  # velocity of rolling for a radius of 1 m, 1/s
+        self.moved = np.zeros((legs, 3))  # by body and rolling since the last sample, m
+        self.climbing = np.zeros(legs)  # vertical speeds, m/s
+        self.held = math.inf  # when a foot last stuck
+        self.sliding_since = math.inf  # since when feet stand and none of them sticks
+
+
+@dataclass
+class Doubts:
+    """A doubt that lasts for some time."""
+
+    lasts: float  # s
+    until: float = -math.inf
+    reason: str = ''
+
+    def add(self, time: float, reason: str) -> None:
+        """Begin a doubt."""
+        self.until, self.reason = time + self.lasts, reason
+
+
+@dataclass
+class Length:
+    """Whether legs are of another length than in the file of the robot."""
+
+    stretched: bool = False
+    look: float = math.nan  # when it is looked at again
+
+
+@dataclass
+class Rest:
+    """Mean of the gyro at rest."""
+
+    since: float = math.nan
+    total: Array = field(default_factory=lambda: np.zeros(3))
+    count: int = 0
+
+
+def checked(joints: tuple[int, ...], readings: Sequence[npt.ArrayLike | None]) -> list[Array]:
+    """Return readings as arrays; raise `InvalidInput` for those not allowed.
+
+    ``joints`` is the shape of the joints of the robot, (legs, joints a leg).
+    """
+    foot_forces = readings[4]
+    size = (joints[0] * joints[1],)
+    names = (
+        ('gyro', (3,), 'rad/s', 1e3),
+        ('accelerometer', (3,), 'm/s2', 1e4),
+        ('joint_positions', size, 'rad', 1e4),
+        ('joint_velocities', size, 'rad/s', 1e4),
+        ('foot_forces', (joints[0], 3), 'N', 1e6),
+        ('efforts', size, 'N m', 1e6),
+    )
+    # The last two may be missing.
+    given: list[tuple[tuple[str, tuple[int, ...], str, float], Any]] = [
+        (names[place], reading)
+        for place, reading in enumerate(readings)
+        if reading is not None or place < 4
+    ]
+    # One look at all of them is enough if they are fine; NaN is not below the limit.
+    if not (
+        all(
+            isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape
+            for (_, shape, _, _), values in given
+        )
+        and np.abs(np.concatenate([np.ravel(values) for _, values in given])).max() < 1e3
+    ):
+        for (name, shape, unit, most), values in given:
+            found = quantity(name, values, unit, -most, most)
+            if found.shape != shape:
+                raise InvalidInput(
+                    f'{name} of shape {found.shape} is not allowed: {shape} is needed'
+                )
+    arrays = [np.asarray(values, dtype=float) for _, values in given]
+    for index in (2, 3) if foot_forces is not None else (2, 3, 4)[: len(arrays) - 2]:
+        arrays[index] = arrays[index].reshape(joints)
+    return [*arrays, _NONE]
