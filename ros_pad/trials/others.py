@@ -78,7 +78,8 @@ class Others:
     def _of(self, policy: str, bar: Bar) -> Metrics | None:
         walk = self._walks.get(policy)
         with bar(f'{policy:8} on the same ground', self._duration) as progress:
-            if walk and not walk.cancel():
+            # A cancelled walk would let the others wait for ever if a process is killed.
+            if walk and (walk.running() or walk.done()):
                 with suppress(BrokenProcessPool):  # killed, possibly for lack of memory
                     return walk.result()
             return self._run(policy=policy, progress=progress).metrics
