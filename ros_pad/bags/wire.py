@@ -18,25 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.bags.codec import MessageType, message_type
+from ros_pad.bags.definitions import message_definition
 from ros_pad.errors import BadMessage
 from ros_pad.records import TIME, Block, Kind
 
 TYPE = 'sensor_msgs/msg/JointState'
-
-_DEFINITION = """std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-""".replace('=' * 16, '=' * 80)
 
 _HEAD = struct.Struct('<4siI')  # encapsulation, stamp
 _ENCAPSULATION = b'\0\1\0\0'  # plain CDR, little-endian
@@ -47,7 +33,7 @@ _LONGEST = 10_000  # records in a message, and s from the first to the last
 
 @functools.cache
 def _type() -> MessageType:
-    return message_type(TYPE, _DEFINITION)
+    return message_type(TYPE, message_definition(TYPE))
 
 
 class _Layout(NamedTuple):

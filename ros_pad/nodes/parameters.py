@@ -153,9 +153,6 @@ def _refuse_misspelt(node: Node, known: Sequence[str]) -> None:
         head = name.split('.')[0]
         if name in known or head in (*_OF_ROS, BACKEND_OPTIONS):
             continue
-        if name == AMBIENT_PRESSURE.name:  # files for earlier versions have it
-            node.get_logger().warning(f'parameter {name} is ignored: merge and views have it')
-            continue
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
         near = near or difflib.get_close_matches(head, [*known, BACKEND_OPTIONS], n=1, cutoff=0.75)
         if near:

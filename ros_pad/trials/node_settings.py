@@ -30,9 +30,6 @@ from ros_pad.trials.label import AMBIENT_PRESSURE, PARAMETERS
 if TYPE_CHECKING:
     from ros_pad.bags import BagReader
 
-OLD_PROBING = 'policy.probing'
-"""Parameter of earlier versions: how probes were planned; ``threshold`` is what is left."""
-
 OWN = (
     EXPECTED_LOAD,
     Setting(
@@ -267,21 +264,8 @@ class NodeSettings:
         return self.policy_parameters if self.policy == 'adaptive' else None
 
     def rules(self) -> Policy:
-        """Return the policy with its parameters and, for an oracle, the true ground.
-
-        Raises
-        ------
-        InvalidInput
-            When the bag is of a policy that ros_pad no longer has.
-        """
+        """Return the policy with its parameters and, for an oracle, the true ground."""
         is_wet = self.floor.wet if self.floor else None
-        if self.policy == 'adaptive' and OLD_PROBING in self.policy_parameters:
-            raise InvalidInput(
-                f'the bag was recorded with {OLD_PROBING} ='
-                f' {self.policy_parameters[OLD_PROBING]!r}, a way of probing that ros_pad does not'
-                ' have any more: its decisions cannot be replayed, its estimates can with'
-                ' another policy (--policy flat or dome)'
-            )
         return policy_named(self.policy, is_wet, self._of_policy())
 
     def controller(self, legs: Sequence[int]) -> MorphologyController:
@@ -348,9 +332,6 @@ def _of_nodes(
         for each in POLICY_SETTINGS
         if each.name in controller
     }
-    if controller.get(OLD_PROBING, 'threshold') != 'threshold':
-        of_policy[OLD_PROBING] = controller[OLD_PROBING]
-    # Bags of earlier versions lack some of these.
     own = {
         each.name: controller.get(each.name, each.default)
         for each in (MARGIN, LIFT_OFF, COMMAND_TIMEOUT)

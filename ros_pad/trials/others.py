@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import os
-import time
-from collections import deque
-from collections.abc import Callable, Iterator, MutableSequence, Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
@@ -29,21 +27,9 @@ NICENESS = 5
 Bar: TypeAlias = 'Callable[[str, float], AbstractContextManager[Progress]]'
 """Shows the progress of a text up to a total."""
 
-_POLL = 0.1  # s, time between two looks at the progress of other processes
-_reached: MutableSequence[float]  # simulated time of each walk, s; only in other processes
 
-
-def _share(reached: MutableSequence[float]) -> None:
-    global _reached  # the only way to pass an array to a process of a pool
-    _reached = reached
-    os.nice(NICENESS)
-
-
-def _walk(run: Callable[..., Trial], policy: str, place: int) -> Metrics | None:
-    def progress(seconds: float) -> None:
-        _reached[place] = seconds
-
-    return run(policy=policy, progress=progress).metrics
+def _walk(run: Callable[..., Trial], policy: str) -> Metrics | None:
+    return run(policy=policy).metrics
 
 
 class Others:
@@ -63,8 +49,6 @@ class Others:
             loop.run, scene, seed=seed, fidelity=level, tuning=tuning, sensing=sensing
         )
         self._policies = policies
-        self._left: deque[str] = deque()  # not begun
-        self._reached: MutableSequence[float] = []
         self._walks: dict[str, Future[Metrics | None]] = {}
 
     @contextmanager
@@ -74,26 +58,10 @@ class Others:
         if free < 1 or self._duration < SHORTEST:
             yield self
             return
-        # Without a lock, which a killed process might keep.
-        self._reached = workers.CONTEXT.RawArray('d', len(self._policies))
-        self._left.extend(self._policies)
-        with workers.pool(free, _share, self._reached) as executor:
-            for _ in range(free):
-                self._begin(executor)
+        with workers.pool(free, os.nice, NICENESS) as executor:
+            for policy in self._policies:
+                self._walks[policy] = executor.submit(_walk, self._run, policy)
             yield self
-            self._left.clear()
-
-    def _begin(self, executor: Executor) -> None:
-        """Begin the next walk, and another one when it ends."""
-        try:
-            policy = self._left.popleft()
-        except IndexError:
-            return
-        place = self._policies.index(policy)
-        with suppress(RuntimeError):  # the executor has ended, or its processes were killed
-            walk = executor.submit(_walk, self._run, policy, place)
-            self._walks[policy] = walk
-            walk.add_done_callback(lambda _: self._begin(executor))
 
     def metrics(self, bar: Bar) -> dict[str, Metrics]:
         """Return the metrics of the walks by policy; what has not begun is walked here.
@@ -103,33 +71,15 @@ class Others:
         PadError
             As :func:`ros_pad.trials.loop.run`.
         """
-        found: dict[str, Metrics | None] = {}
-        while True:
-            try:
-                policy = self._left.pop()  # from the last on: the others begin with the first
-            except IndexError:
-                break
-            found[policy] = self._here(policy, bar)
-        for place, policy in enumerate(self._policies):
-            if policy not in found:
-                try:
-                    found[policy] = self._awaited(policy, place, bar)
-                except (KeyError, BrokenProcessPool):  # killed, possibly for lack of memory
-                    found[policy] = self._here(policy, bar)
+        # From the last on: the others begin with the first.
+        found = {policy: self._of(policy, bar) for policy in reversed(self._policies)}
         return {policy: each for policy in self._policies if (each := found[policy]) is not None}
 
-    def _here(self, policy: str, bar: Bar) -> Metrics | None:
-        with bar(_text(policy), self._duration) as progress:
+    def _of(self, policy: str, bar: Bar) -> Metrics | None:
+        walk = self._walks.get(policy)
+        with bar(f'{policy:8} on the same ground', self._duration) as progress:
+            # A cancelled walk would let the others wait for ever if a process is killed.
+            if walk and (walk.running() or walk.done()):
+                with suppress(BrokenProcessPool):  # killed, possibly for lack of memory
+                    return walk.result()
             return self._run(policy=policy, progress=progress).metrics
-
-    def _awaited(self, policy: str, place: int, bar: Bar) -> Metrics | None:
-        walk = self._walks[policy]
-        with bar(_text(policy), self._duration) as progress:
-            while not walk.done():
-                progress(self._reached[place])
-                time.sleep(_POLL)
-            return walk.result()
-
-
-def _text(policy: str) -> str:
-    return f'{policy:8} on the same ground'

@@ -17,7 +17,6 @@ import os
 import pathlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -258,7 +257,7 @@ def _described(bag: BagReader) -> dict[str, Any]:
         'policy': about.policy,
         'fidelity': about.fidelity,
         'seed': about.seed,
-        'floor': partial(about.floor.build, about.seed) if about.floor else None,
+        'floor': about.floor.build(about.seed) if about.floor else None,
         'metrics': about.metrics,
         'settings': about.settings | settings,
         'real_time_factor': about.real_time_factor,

@@ -120,25 +120,6 @@ def heading(x: float, y: float, z: float, w: float) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-class _OnDemand:
-    """A field that may be set to a function, which makes its value when it is first read."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = f'_{name}'
-
-    def __get__(self, owner: object, kind: type) -> Any:
-        if owner is None:
-            return None  # the default
-        value = getattr(owner, self._name)
-        if callable(value):
-            value = value()
-            setattr(owner, self._name, value)
-        return value
-
-    def __set__(self, owner: object, value: Any) -> None:
-        setattr(owner, self._name, value)
-
-
 @dataclass
 class Trial:
     """Time series and metrics of one trial.
@@ -191,7 +172,7 @@ class Trial:
         Estimated position x and y of the body, m, and heading, rad, in odom; shape (0, 3) with
         markers. Feet are in the world all the same.
     floor : Floor or None
-        The true floor; None where it is unknown. It may be given as a function that builds it.
+        The true floor; None where it is unknown.
     metrics : Metrics or None
         None where the true floor is unknown, as for a robot's bag.
     settings : dict
@@ -218,7 +199,7 @@ class Trial:
     slip_speed: np.ndarray
     slipping: np.ndarray
     dome: np.ndarray
-    floor: Floor | None = _OnDemand()  # type: ignore[assignment]
+    floor: Floor | None = None
     metrics: Metrics | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     real_time_factor: float | None = None

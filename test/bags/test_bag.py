@@ -263,16 +263,16 @@ def test_hashes_and_definitions_are_those_of_ros():
         'RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18'
     )
     parts = message_definition('diagnostic_msgs/msg/DiagnosticArray').split('=' * 80 + '\n')
-    assert [part.splitlines()[0] for part in parts[1:]] == [
+    assert {part.splitlines()[0] for part in parts[1:]} == {
         'MSG: diagnostic_msgs/DiagnosticStatus',
         'MSG: diagnostic_msgs/KeyValue',
         'MSG: std_msgs/Header',
         'MSG: builtin_interfaces/Time',
-    ]
+    }
 
 
 def test_an_unknown_type_is_named():
-    with pytest.raises(BagError, match=r'no_such_msgs/msg/Thing.*Is the ROS package no_such_msgs'):
+    with pytest.raises(BagError, match=r'no_such_msgs/msg/Thing.*schema'):
         message_definition('no_such_msgs/msg/Thing')
     with pytest.raises(BagError, match='std_msgs/msg/Flot64'):
         type_hash('std_msgs/msg/Flot64')

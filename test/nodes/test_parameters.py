@@ -242,14 +242,6 @@ def test_each_parameter_of_each_node_changes_or_is_refused(name, context, tmp_pa
         node.destroy_node()
 
 
-def test_a_file_for_earlier_versions_gives_a_warning(bench, capfd):
-    """Ambient pressure was a parameter of all nodes; gauge pressures do not depend on it."""
-    for kind in (RegulatorNode, ControllerNode):
-        bench.start(kind, ambient_pressure=85000.0)
-        words = 'parameter ambient_pressure is ignored: merge and views have it'
-        assert words in capfd.readouterr().err
-
-
 @pytest.mark.parametrize(
     ('parameter', 'given', 'allowed'),
     [

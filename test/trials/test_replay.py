@@ -304,20 +304,6 @@ def test_parameters_of_other_nodes_are_an_error_of_ours(tmp_path, changes):
         NodeSettings.of(BagReader(tmp_path / 'other'))
 
 
-def test_a_bag_of_the_planner_of_probes_is_refused_under_its_policy(tmp_path):
-    said = json.loads(BagReader(SAMPLE).custom_data[PARAMETERS])
-    (controller,) = (each for each in said.values() if {'policy', 'margin'} <= each.keys())
-    controller['policy.probing'] = 'value'
-    BagWriter(tmp_path / 'bag', {PARAMETERS: json.dumps(said)}).close()
-    settings = NodeSettings.of(BagReader(tmp_path / 'bag'))
-    with pytest.raises(InvalidInput, match=r"policy.probing = 'value'.*cannot be replayed"):
-        settings.changed()
-    assert settings.changed(policy='dome').rules()
-    controller['policy.probing'] = 'threshold'  # this way of probing is left
-    BagWriter(tmp_path / 'other', {PARAMETERS: json.dumps(said)}).close()
-    assert NodeSettings.of(BagReader(tmp_path / 'other')).changed().policy == 'adaptive'
-
-
 # --- bags of other robots -----------------------------------------------------------------------
 
 
