@@ -16,7 +16,6 @@ from matplotlib.lines import Line2D
 from ros_pad.pace import Progress
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PURPLE, SKY, STYLE, VERMILION
 from studies.work_precision.walk.hexapod import DRAKE, FREE, STIFF, TOP
-from studies.work_precision.walk.rail import LEGS
 from studies.work_precision.walk.results import FAILED, WalkResult
 from studies.work_precision.walk.walkers import HEXAPOD, RAIL, TOWING, named
 
@@ -156,7 +155,6 @@ _LOOKS: dict[str, dict[str, Any]] = {
     DRAKE['sap']: {'color': PALE, 'marker': '>'},
     DRAKE['tamsi']: {'color': PALE, 'marker': 'v'},
     'RailLeg': {'color': GREEN, 'marker': 'o'},
-    f'walk_many, {LEGS} legs': {'color': GREEN, 'marker': 's'},
     'solve_ivp, events, 1e-6': {'color': BLUE, 'marker': 'D'},
     'solve_ivp, events, 1e-3': {'color': BLUE, 'marker': 'D'},
     'solve_ivp, smoothed, LSODA': {'color': VERMILION, 'marker': 'X'},
@@ -272,13 +270,9 @@ def _write_names(panel: Axes, part: Sequence[WalkResult]) -> None:
     first = {result.family: result for result in reversed(part) if result.family in _LOOKS}
     for family, result in first.items():
         panel.annotate(
-            (_with_steps(family, part) if result.step_s else family)
-            .replace(f', {LEGS} legs', '')
-            .removeprefix('solve_ivp, '),
+            (_with_steps(family, part) if result.step_s else family).removeprefix('solve_ivp, '),
             (result.ms_per_second, 1e2 * result.errors['distance']),
-            xytext={'RailLeg': (2, 9)}.get(
-                family, (-34, -18) if 'walk_many' in family else (8, -3)
-            ),
+            xytext={'RailLeg': (2, 9)}.get(family, (8, -3)),
             textcoords='offset points',
             fontsize=8,
             color=_LOOKS[family]['color'],

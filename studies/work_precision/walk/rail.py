@@ -12,12 +12,9 @@ from typing import Any
 from scipy.integrate import solve_ivp
 
 from ros_pad.contact.film import Film
-from ros_pad.simulation.rail_leg import RailLeg, walk_many
+from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import RailBody, RailGait, Scene
 from studies.work_precision.walk.walkers import CYCLES, RAIL, Walk, Walked, Walker, named, walked
-
-LEGS = 200  # number of rail legs that walk_many computes at once
-
 
 LEG = 'RailLeg, 4 ms'
 EVENTS = 'solve_ivp, events, 1e-11'
@@ -45,7 +42,6 @@ def rail_walks() -> list[Walk]:
 def rail_walkers() -> list[Walker]:
     """Return all walkers of the rail leg."""
     walkers = [_rail(step) for step in (1e-4, 1e-3, 4e-3)]
-    walkers += [_rail_batch(step) for step in (1e-3, 4e-3)]
     for family, method, tolerance in (
         (EVENTS, 'DOP853', 1e-11),
         ('solve_ivp, events, 1e-6', 'RK45', 1e-6),
@@ -70,21 +66,6 @@ def _rail(step: float) -> Walker:
         return walked(leg, case.scene, count, time.perf_counter() - start)
 
     return Walker('RailLeg', named('RailLeg', step), step, walk)
-
-
-def _rail_batch(step: float) -> Walker:
-    family = f'walk_many, {LEGS} legs'
-
-    def walk(case: Walk) -> Walked:
-        scene, count = case.scene, round(case.scene.duration / step)
-        every = [scene] * LEGS, [scene.floor.build(case.seed)] * LEGS, [case.pressure] * LEGS
-        start = time.perf_counter()
-        legs = walk_many(*every, step, scene.duration)
-        taken = (time.perf_counter() - start) / LEGS
-        distance, slip = legs.position[0] / scene.cycles, legs.slip_path[0] / scene.cycles
-        return Walked(float(distance), float(slip), 0.0, 0.0, None, count, taken)
-
-    return Walker(family, named(family, step), step, walk)
 
 
 def cap_in_stance(case: Walk) -> Callable[[float], float]:
