@@ -23,7 +23,14 @@ from ros_pad.errors import NoConvergence
 from ros_pad.records import Array
 from ros_pad.simulation import compiled, planar_step
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.planar_step import PlanarModel
+from ros_pad.simulation.planar_step import (
+    PlanarFloor,
+    PlanarFoot,
+    PlanarGait,
+    PlanarModel,
+    PlanarTow,
+    PlanarTrunk,
+)
 from ros_pad.simulation.robot import FootState, Vector, check_pressures, check_reach
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import CELL, WIDTH, Floor
@@ -111,22 +118,24 @@ class PlanarRobot:
         """Place the feet as if the gait had been running before time zero."""
         model, table = self.model, self.table
         for index in range(len(self.legs)):
-            phase = (model.duty / 2.0 - model.middle[index]) % 1.0
-            offset = model.reach
-            if phase < model.duty:
-                offset += planar_step.body_advance(model, -phase * model.cycle)
+            phase = (model.gait.duty / 2.0 - model.gait.middle[index]) % 1.0
+            offset = model.gait.reach
+            if phase < model.gait.duty:
+                offset += planar_step.body_advance(model, -phase * model.gait.cycle)
             else:
-                offset *= -math.cos(math.pi * (phase - model.duty) / (1.0 - model.duty))
+                offset *= -math.cos(math.pi * (phase - model.gait.duty) / (1.0 - model.gait.duty))
             table[planar_step.PHASE][index] = phase
             table[planar_step.OFFSET_X][index] = table[planar_step.LIFTED_X][index] = offset
-            if phase < model.duty:
+            if phase < model.gait.duty:
                 planar_step.touch_down(model, self.state, table, index)
 
     def _compile(self) -> None:
         model = self.model
         self.state, self.table = np.array(self.state), np.array(self.table)
+        floor = model.floor
         self.model = model._replace(
-            limits=np.array(model.limits), wet=np.array(model.wet), heights=np.array(model.heights)
+            foot=model.foot._replace(limits=np.array(model.foot.limits)),
+            floor=floor._replace(wet=np.array(floor.wet), heights=np.array(floor.heights)),
         )
         self._walk = compiled.walk(
             self.model, self.state, self.table, (0.0,) * len(self.legs), 1, True
@@ -250,92 +259,95 @@ def model_of(scene: Scene, floor: Floor, period: float, soles_turn: bool = False
     return PlanarModel(
         period=period,
         settle=scene.settle,
-        soles_turn=soles_turn,
-        **_of_gait(scene),
-        **_of_body(scene),
-        **_of_feet(scene),
-        **_of_floor(floor),
+        gait=_gait(scene, soles_turn),
+        trunk=_trunk(scene),
+        tow=_tow(scene),
+        foot=_foot(scene),
+        floor=_floor(floor),
     )
 
 
-def _of_gait(scene: Scene) -> dict[str, Any]:
+def _gait(scene: Scene, soles_turn: bool) -> PlanarGait:
     gait = scene.gait
-    assert isinstance(scene.body, LeggedBody)
     assert isinstance(gait, WalkingGait)
-    reach = max(x * x + y * y for x, y in scene.body.homes)
-    return {
-        'cycle': gait.cycle,
-        'stride': gait.stride,
-        'duty': gait.duty,
-        'lift': gait.lift,
-        'reach': gait.reach(),
-        'pushes': gait.pushes,
-        'overlap': gait.overlap,
-        'rocks': 0.0 if gait.fewest >= 3 and len(gait.middles) > 4 else 1e-9 * reach,
-        'heading_gain': scene.heading_gain,
-        'middle': gait.middles,
-    }
+    return PlanarGait(
+        cycle=gait.cycle,
+        stride=gait.stride,
+        duty=gait.duty,
+        lift=gait.lift,
+        reach=gait.reach(),
+        pushes=gait.pushes,
+        overlap=gait.overlap,
+        middle=gait.middles,
+        heading_gain=scene.heading_gain,
+        soles_turn=soles_turn,
+    )
 
 
-def _of_body(scene: Scene) -> dict[str, Any]:
-    """Return constants of body, legs and towed load."""
-    body, tow, slope = scene.body, scene.tow, scene.floor.slope
-    assert isinstance(body, LeggedBody)
-    across = math.cos(slope)
+def _trunk(scene: Scene) -> PlanarTrunk:
+    body, gait, slope = scene.body, scene.gait, scene.floor.slope
+    assert isinstance(body, LeggedBody) and isinstance(gait, WalkingGait)
+    reach = max(x * x + y * y for x, y in body.homes)
     hips = body.robot.hips.tolist()
-    return {
-        'home_x': tuple(x for x, _ in body.homes),
-        'home_y': tuple(y for _, y in body.homes),
-        'centre_x': float(body.robot.centre[0]),
-        'centre_y': float(body.robot.centre[1]),
-        'hip_x': tuple(hip[0] for hip in hips),
-        'hip_y': tuple(hip[1] for hip in hips),
-        'mass': body.mass,
-        'inertia': body.inertia,
-        'height': body.height,
-        'weight': body.mass * GRAVITY * across,
-        'downhill': GRAVITY * math.sin(slope),
-        'leg_stiffness': body.leg_stiffness,
-        'towed': tow.weight / GRAVITY,
-        'tow_dry': tow.weight * tow.friction_dry * across,
-        'tow_wet': tow.weight * tow.friction_wet * across,
-        'tow_distance': tow.distance,
-        'tow_height': tow.height,
-        'tow_stiffness': tow.stiffness,
-    }
+    return PlanarTrunk(
+        home_x=tuple(x for x, _ in body.homes),
+        home_y=tuple(y for _, y in body.homes),
+        hip_x=tuple(hip[0] for hip in hips),
+        hip_y=tuple(hip[1] for hip in hips),
+        centre_x=float(body.robot.centre[0]),
+        centre_y=float(body.robot.centre[1]),
+        mass=body.mass,
+        inertia=body.inertia,
+        height=body.height,
+        weight=body.mass * GRAVITY * math.cos(slope),
+        downhill=GRAVITY * math.sin(slope),
+        leg_stiffness=body.leg_stiffness,
+        rocks=0.0 if gait.fewest >= 3 and len(gait.middles) > 4 else 1e-9 * reach,
+    )
 
 
-def _of_feet(scene: Scene) -> dict[str, Any]:
-    """Return constants of friction and film of a foot on the scene's floor."""
+def _tow(scene: Scene) -> PlanarTow:
+    tow, across = scene.tow, math.cos(scene.floor.slope)
+    return PlanarTow(
+        mass=tow.weight / GRAVITY,
+        dry=tow.weight * tow.friction_dry * across,
+        wet=tow.weight * tow.friction_wet * across,
+        distance=tow.distance,
+        height=tow.height,
+        stiffness=tow.stiffness,
+    )
+
+
+def _foot(scene: Scene) -> PlanarFoot:
     viscosity, foot = scene.floor.viscosity, scene.foot.on_rough(scene.floor.roughness)
-    return {
-        'friction': foot.friction,
-        'shear_strength': foot.shear_strength,
-        'conforming_pressure': foot.conforming_pressure,
-        'boundary_friction': foot.boundary_friction,
-        'capillary': foot.pads * foot.capillary_force,
-        'critical_film': foot.critical_film,
-        'film_exponent': foot.film_exponent,
-        'shear_stiffness': foot.shear_stiffness,
-        'turning_radius': foot.turning_radius,
-        'sole_area': foot.sole_area,
-        'dome_drain': 4.0 * math.pi * foot.pads / (3.0 * viscosity),
-        'sole_drain': 4.0 / (3.0 * viscosity * foot.sole_radius**2),
-        'limit_cell': foot._limit_cell,
-        'limits': foot._limit_table,
-    }
+    return PlanarFoot(
+        friction=foot.friction,
+        shear_strength=foot.shear_strength,
+        conforming_pressure=foot.conforming_pressure,
+        boundary_friction=foot.boundary_friction,
+        capillary=foot.pads * foot.capillary_force,
+        critical_film=foot.critical_film,
+        film_exponent=foot.film_exponent,
+        shear_stiffness=foot.shear_stiffness,
+        turning_radius=foot.turning_radius,
+        sole_area=foot.sole_area,
+        dome_drain=4.0 * math.pi * foot.pads / (3.0 * viscosity),
+        sole_drain=4.0 / (3.0 * viscosity * foot.sole_radius**2),
+        limit_cell=foot._limit_cell,
+        limits=foot._limit_table,
+    )
 
 
-def _of_floor(floor: Floor) -> dict[str, Any]:
+def _floor(floor: Floor) -> PlanarFloor:
     heights = floor.heights
-    return {
-        'puddle': floor.film_thickness**-2 if floor.film_thickness > 0.0 else math.inf,
-        'wet': floor.wet_map.tolist(),
-        'wet_cell': floor.cell,
-        'wet_x': floor.origin[0],
-        'wet_y': floor.origin[1],
-        'heights': [[0.0]] if heights is None else heights.tolist(),
-        'height_cell': CELL,
-        'height_x': -1.0,
-        'height_y': -WIDTH / 2.0,
-    }
+    return PlanarFloor(
+        puddle=floor.film_thickness**-2 if floor.film_thickness > 0.0 else math.inf,
+        wet=floor.wet_map.tolist(),
+        wet_cell=floor.cell,
+        wet_x=floor.origin[0],
+        wet_y=floor.origin[1],
+        heights=[[0.0]] if heights is None else heights.tolist(),
+        height_cell=CELL,
+        height_x=-1.0,
+        height_y=-WIDTH / 2.0,
+    )

@@ -57,11 +57,9 @@ BODY = 17
 ) = range(BODY)  # fmt: skip
 
 
-class PlanarModel(NamedTuple):
-    """Constants of a walk in SI units, without nested objects, which numba does not accept."""
+class PlanarGait(NamedTuple):
+    """The gait, and how it moves feet and soles."""
 
-    period: float
-    settle: float
     cycle: float
     stride: float
     duty: float
@@ -69,28 +67,43 @@ class PlanarModel(NamedTuple):
     reach: float
     pushes: bool  # whether the body's speed is zero twice a cycle
     overlap: float  # share of the cycle in which load passes from foot to foot
-    rocks: float  # m²: lets feet in a line carry the body; 0 if it must be in balance
-    heading_gain: float
     middle: tuple[float, ...]  # time of the middle of each leg's push, as a share of the cycle
+    heading_gain: float
+    soles_turn: bool
+
+
+class PlanarTrunk(NamedTuple):
+    """Body and legs."""
+
     home_x: tuple[float, ...]
     home_y: tuple[float, ...]
-    centre_x: float  # of mass, in the body, m
-    centre_y: float
-    soles_turn: bool
     hip_x: tuple[float, ...]
     hip_y: tuple[float, ...]
+    centre_x: float  # of mass, in the body, m
+    centre_y: float
     mass: float
     inertia: float
     height: float
     weight: float  # component of the weight normal to the floor, N
     downhill: float  # acceleration along -x, m/s²
     leg_stiffness: float
-    towed: float  # mass, kg
-    tow_dry: float  # drag of the towed load on dry ground, N
-    tow_wet: float  # drag of the towed load on wet ground, N
-    tow_distance: float
-    tow_height: float
-    tow_stiffness: float
+    rocks: float  # m²: lets feet in a line carry the body; 0 if it must be in balance
+
+
+class PlanarTow(NamedTuple):
+    """The towed load."""
+
+    mass: float  # mass, kg
+    dry: float  # drag of the towed load on dry ground, N
+    wet: float  # drag of the towed load on wet ground, N
+    distance: float
+    height: float
+    stiffness: float
+
+
+class PlanarFoot(NamedTuple):
+    """Friction and film of a foot on the floor of the scene."""
+
     friction: float
     shear_strength: float
     conforming_pressure: float
@@ -105,6 +118,11 @@ class PlanarModel(NamedTuple):
     sole_drain: float
     limit_cell: float
     limits: Any  # sequence of force limits, N, every limit_cell from 0 Pa
+
+
+class PlanarFloor(NamedTuple):
+    """Maps of liquid and heights."""
+
     puddle: float  # 1/h² of standing liquid, 1/m²
     wet: Any  # [row along y][column along x], True where wet
     wet_cell: float
@@ -114,6 +132,18 @@ class PlanarModel(NamedTuple):
     height_cell: float
     height_x: float
     height_y: float
+
+
+class PlanarModel(NamedTuple):
+    """Constants of a walk in SI units, in tuples and sequences, because numba takes no objects."""
+
+    period: float
+    settle: float
+    gait: PlanarGait
+    trunk: PlanarTrunk
+    tow: PlanarTow
+    foot: PlanarFoot
+    floor: PlanarFloor
 
 
 def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -> bool:
@@ -131,23 +161,23 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
     middle = body[HEADING] + 0.5 * body[YAW_RATE] * dt
     cosine, sine = cos(middle), sin(middle)
     contacts = grip(model, body, feet, pressures, cosine, sine)
-    towed = model.towed
+    towed = model.tow.mass
     cap = 0.0
     if towed > 0.0:
-        behind_x = body[X] - model.tow_distance * cosine
-        behind_y = body[Y] - model.tow_distance * sine
-        cap = model.tow_wet if is_wet(model, behind_x, behind_y) else model.tow_dry
+        behind_x = body[X] - model.tow.distance * cosine
+        behind_y = body[Y] - model.tow.distance * sine
+        cap = model.tow.wet if is_wet(model, behind_x, behind_y) else model.tow.dry
     body[SLED_CAP] = cap
-    stiffness = model.tow_stiffness
+    stiffness = model.tow.stiffness
     if cap > 0.0:
         contacts.append((
             0.0, 0.0, body[SLED_X] / dt, body[SLED_Y] / dt, 0.0, 0.0, cap, stiffness * dt
         ))  # fmt: skip
-    mass = model.mass + towed
+    mass = model.trunk.mass + towed
     last_x, last_y = body[SPEED_X], body[SPEED_Y]
-    free_x = last_x - model.downhill * dt
+    free_x = last_x - model.trunk.downhill * dt
     vx, vy, yaw_rate, converged = newton(
-        (free_x, last_y, body[YAW_RATE]), mass, model.inertia, contacts, dt,
+        (free_x, last_y, body[YAW_RATE]), mass, model.trunk.inertia, contacts, dt,
         (last_x, last_y, body[YAW_RATE]), 0.0,
     )  # fmt: skip
     if not converged:
@@ -157,7 +187,7 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
         drag_x, drag_y, _, _, _ = push(vx, vy, yaw_rate, contacts[-1], dt)
     body[SLED_X], body[SLED_Y] = -drag_x / stiffness, -drag_y / stiffness
     # The line pulls the body by the load's friction, its inertia and its weight downhill.
-    body[PULL_X] = drag_x - towed * ((vx - last_x) / dt + model.downhill)
+    body[PULL_X] = drag_x - towed * ((vx - last_x) / dt + model.trunk.downhill)
     body[PULL_Y] = drag_y - towed * (vy - last_y) / dt
     body[SPEED_X], body[SPEED_Y], body[YAW_RATE] = vx, vy, yaw_rate
     body[X] += vx * dt
@@ -188,15 +218,16 @@ def walk(
 
 def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: float) -> None:
     """Move the feet in the body as the gait prescribes, between two times of the gait, s."""
-    cycle, duty, reach = model.cycle, model.duty, model.reach
+    gait, trunk = model.gait, model.trunk
+    cycle, duty, reach = gait.cycle, gait.duty, gait.reach
     advance = body_advance(model, time) - body_advance(model, before)
-    turn = -model.heading_gain * body[HEADING] * model.period
+    turn = -gait.heading_gain * body[HEADING] * model.period
     phases, offset_x, offset_y = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y]
     lifted_x, lifted_y = feet[LIFTED_X], feet[LIFTED_Y]
     heights, step_x, step_y = feet[HEIGHT], feet[STEP_X], feet[STEP_Y]
     share = time / cycle
-    for index in range(len(model.middle)):
-        phase = (share - model.middle[index] + duty / 2.0) % 1.0
+    for index in range(len(gait.middle)):
+        phase = (share - gait.middle[index] + duty / 2.0) % 1.0
         x, y = offset_x[index], offset_y[index]
         stood = phases[index] < duty
         phases[index] = phase
@@ -205,14 +236,14 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
                 touch_down(model, body, feet, index)
             # The foot moves in the body against the motion of the body.
             heights[index] = 0.0
-            step_x[index] = turn * (model.home_y[index] + y) - advance
-            step_y[index] = -turn * (model.home_x[index] + x)
+            step_x[index] = turn * (trunk.home_y[index] + y) - advance
+            step_y[index] = -turn * (trunk.home_x[index] + x)
             offset_x[index] = x + step_x[index]
             offset_y[index] = y + step_y[index]
-            if model.soles_turn:
+            if gait.soles_turn:
                 # The sole turns with its leg, by the angle of the foot's motion seen from the hip.
-                arm_x = model.home_x[index] - model.hip_x[index] + x + 0.5 * step_x[index]
-                arm_y = model.home_y[index] - model.hip_y[index] + y + 0.5 * step_y[index]
+                arm_x = trunk.home_x[index] - trunk.hip_x[index] + x + 0.5 * step_x[index]
+                arm_y = trunk.home_y[index] - trunk.hip_y[index] + y + 0.5 * step_y[index]
                 across = arm_x * step_y[index] - arm_y * step_x[index]
                 feet[STEP_TURN][index] = across / (arm_x * arm_x + arm_y * arm_y)
         else:
@@ -221,22 +252,23 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
             swing = (phase - duty) / (1.0 - duty)
             progress = 0.5 - 0.5 * cos(pi * swing)
             rise = sin(pi * swing)
-            heights[index] = model.lift * rise * rise
+            heights[index] = gait.lift * rise * rise
             offset_x[index] = lifted_x[index] + progress * (reach - lifted_x[index])
             offset_y[index] = lifted_y[index] * (1.0 - progress)
 
 
 def body_advance(model: PlanarModel, time: float) -> float:
     """Return the intended advance of the body since time zero, m."""
-    speed = model.stride / model.cycle
-    if model.pushes:
-        angle = 4.0 * pi * time / model.cycle
-        return speed * (time - model.cycle / (4.0 * pi) * sin(angle))
+    gait = model.gait
+    speed = gait.stride / gait.cycle
+    if gait.pushes:
+        angle = 4.0 * pi * time / gait.cycle
+        return speed * (time - gait.cycle / (4.0 * pi) * sin(angle))
     if time <= 0.0:
         return speed * time
-    if time >= model.cycle:
-        return speed * (time - 0.5 * model.cycle)
-    return 0.5 * speed * (time - model.cycle / pi * sin(pi * time / model.cycle))
+    if time >= gait.cycle:
+        return speed * (time - 0.5 * gait.cycle)
+    return 0.5 * speed * (time - gait.cycle / pi * sin(pi * time / gait.cycle))
 
 
 def load_share(duty: float, overlap: float, phase: float) -> float:
@@ -253,22 +285,23 @@ def load_share(duty: float, overlap: float, phase: float) -> float:
 def touch_down(model: PlanarModel, body: Any, feet: Any, index: int) -> None:
     """Start a stance: read the depth of the liquid and the height of the ground at the foot."""
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
-    home_x = model.home_x[index] + feet[OFFSET_X][index]
-    home_y = model.home_y[index] + feet[OFFSET_Y][index]
+    home_x = model.trunk.home_x[index] + feet[OFFSET_X][index]
+    home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
     x = body[X] + cosine * home_x - sine * home_y
     y = body[Y] + sine * home_x + cosine * home_y
-    fresh = model.puddle if is_wet(model, x, y) else inf
+    fresh = model.floor.puddle if is_wet(model, x, y) else inf
     feet[FRESH][index] = feet[DOME_FILM][index] = feet[SOLE_FILM][index] = fresh
     feet[DOME_AREA][index] = 0.0
-    heights, cell = model.heights, model.height_cell
-    row = heights[int((y - model.height_y) // cell) % len(heights)]
-    feet[GROUND][index] = row[int((x - model.height_x) // cell) % len(row)]
+    heights, cell = model.floor.heights, model.floor.height_cell
+    row = heights[int((y - model.floor.height_y) // cell) % len(heights)]
+    feet[GROUND][index] = row[int((x - model.floor.height_x) // cell) % len(row)]
 
 
 def is_wet(model: PlanarModel, x: float, y: float) -> bool:
     """Return whether there is liquid at a world position, m."""
-    row = model.wet[int((y - model.wet_y) // model.wet_cell) % len(model.wet)]
-    return row[int((x - model.wet_x) // model.wet_cell) % len(row)]
+    floor = model.floor
+    row = floor.wet[int((y - floor.wet_y) // floor.wet_cell) % len(floor.wet)]
+    return row[int((x - floor.wet_x) // floor.wet_cell) % len(row)]
 
 
 # --- loads ------------------------------------------------------------------------------------
@@ -286,27 +319,27 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     A gait in which only two feet stand, such as a trot, is in balance on average only. There
     ``rocks`` lets the line between them carry the weight, without the moment about that line.
     """
-    duty = model.duty
+    duty = model.gait.duty
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
-    lift = model.tow_height - model.height
-    lean_x = lift * body[PULL_X] - model.height * body[PUSH_X]
-    lean_y = lift * body[PULL_Y] - model.height * body[PUSH_Y]
+    lift = model.tow.height - model.trunk.height
+    lean_x = lift * body[PULL_X] - model.trunk.height * body[PUSH_X]
+    lean_y = lift * body[PULL_Y] - model.trunk.height * body[PUSH_Y]
     wanted = (
-        model.weight,
-        cosine * lean_x + sine * lean_y + model.weight * model.centre_x,
-        cosine * lean_y - sine * lean_x + model.weight * model.centre_y,
+        model.trunk.weight,
+        cosine * lean_x + sine * lean_y + model.trunk.weight * model.trunk.centre_x,
+        cosine * lean_y - sine * lean_x + model.trunk.weight * model.trunk.centre_y,
     )
     phases, offset_x, offset_y, ground = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y], feet[GROUND]
     loads = feet[LOAD]
     legs = []
-    for index in range(len(model.middle)):
+    for index in range(len(model.gait.middle)):
         loads[index] = 0.0
-        share = load_share(duty, model.overlap, phases[index])
+        share = load_share(duty, model.gait.overlap, phases[index])
         if share > 0.0:
-            x = model.home_x[index] + offset_x[index]
-            y = model.home_y[index] + offset_y[index]
-            legs.append((index, share, x, y, model.leg_stiffness * ground[index]))
-    count = len(model.middle)
+            x = model.trunk.home_x[index] + offset_x[index]
+            y = model.trunk.home_y[index] + offset_y[index]
+            legs.append((index, share, x, y, model.trunk.leg_stiffness * ground[index]))
+    count = len(model.gait.middle)
     sets = 1 << count
     presses = sets - 1  # set of feet that press, with a bit for each foot
     pulling = 0
@@ -315,7 +348,7 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     for attempt in range(2 * count + sets):
         if attempt >= 2 * count:
             presses = attempt - 2 * count
-        wrong = balance(legs, presses, wanted, model.rocks, loads)
+        wrong = balance(legs, presses, wanted, model.trunk.rocks, loads)
         if wrong == 0:
             return
         if pulling == 0:
@@ -399,15 +432,15 @@ def grip(
     The contacts are in the order of the feet.
     """
     dt = model.period
-    stiffness, radius = model.shear_stiffness, model.turning_radius
+    stiffness, radius = model.foot.shear_stiffness, model.foot.turning_radius
     contacts = []
-    for index in range(len(model.middle)):
+    for index in range(len(model.gait.middle)):
         load = feet[LOAD][index]
         if load <= 0.0:
             feet[CAP][index] = 0.0
             continue
-        home_x = model.home_x[index] + feet[OFFSET_X][index]
-        home_y = model.home_y[index] + feet[OFFSET_Y][index]
+        home_x = model.trunk.home_x[index] + feet[OFFSET_X][index]
+        home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
         x, y = cosine * home_x - sine * home_y, sine * home_x + cosine * home_y
         pressure = pressures[index]
         on_domes = dome_load(model, load, pressure)
@@ -437,8 +470,8 @@ def dome_load(model: PlanarModel, load: float, pressure: float) -> float:
     """Return the part of a load, N, that domes carry at a gauge pressure, Pa."""
     if pressure <= 0.0:
         return 0.0
-    place = pressure / model.limit_cell
-    table = model.limits
+    place = pressure / model.foot.limit_cell
+    table = model.foot.limits
     last = len(table) - 1
     if place >= last:
         limit = table[last]
@@ -461,11 +494,11 @@ def drain(
             old = feet[DOME_AREA][index] / area
             feet[DOME_FILM][index] = fresh + old * (feet[DOME_FILM][index] - fresh)
         feet[DOME_AREA][index] = area
-        feet[DOME_FILM][index] += model.dome_drain * pressure / area * dt
+        feet[DOME_FILM][index] += model.foot.dome_drain * pressure / area * dt
     else:
         feet[DOME_AREA][index] = 0.0
     if on_sole > 0.0:
-        feet[SOLE_FILM][index] += model.sole_drain * on_sole / model.sole_area * dt
+        feet[SOLE_FILM][index] += model.foot.sole_drain * on_sole / model.foot.sole_area * dt
 
 
 def resistance(
@@ -478,18 +511,17 @@ def resistance(
 ) -> float:
     """Return the tangential capacity of a foot, N."""
     total = under_domes = 0.0
-    conforming = model.conforming_pressure
+    foot = model.foot
+    conforming = foot.conforming_pressure
     if on_domes > 0.0:
         under_domes = on_domes / (pressure if pressure > conforming else conforming)
-        dry = model.friction * on_domes + model.shear_strength * under_domes
+        dry = foot.friction * on_domes + foot.shear_strength * under_domes
         total += on_film(model, dry, on_domes, dome_film)
         if dome_film > 0.0:
-            total += model.capillary
+            total += foot.capillary
     if on_sole > 0.0:
-        free, touched = model.sole_area - under_domes, on_sole / conforming
-        dry = model.friction * on_sole + model.shear_strength * (
-            touched if touched < free else free
-        )
+        free, touched = foot.sole_area - under_domes, on_sole / conforming
+        dry = foot.friction * on_sole + foot.shear_strength * (touched if touched < free else free)
         total += on_film(model, dry, on_sole, sole_film)
     return total
 
@@ -498,8 +530,9 @@ def on_film(model: PlanarModel, dry: float, load: float, film: float) -> float:
     """Return the resistance of a contact on a film, N; ``dry`` is its resistance without one."""
     if film <= 0.0:
         return dry
-    touching = exp(-((film / model.critical_film) ** model.film_exponent))
-    return touching * dry + (1.0 - touching) * model.boundary_friction * load
+    foot = model.foot
+    touching = exp(-((film / foot.critical_film) ** foot.film_exponent))
+    return touching * dry + (1.0 - touching) * foot.boundary_friction * load
 
 
 def newton(
@@ -637,13 +670,13 @@ def report(
 ) -> None:
     """Set forces, shear, slip and markers of the feet, and add the work lost in slip."""
     dt = model.period
-    stiffness, radius = model.shear_stiffness, model.turning_radius
+    stiffness, radius = model.foot.shear_stiffness, model.foot.turning_radius
     torsional = stiffness * radius * radius
     vx, vy, yaw_rate = body[SPEED_X], body[SPEED_Y], body[YAW_RATE]
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     total_x = total_y = 0.0
     place = 0
-    for index in range(len(model.middle)):
+    for index in range(len(model.gait.middle)):
         fx = fy = moment = slid = 0.0
         if feet[CAP][index] > 0.0:
             fx, fy, moment, slid, lost = push(vx, vy, yaw_rate, contacts[place], dt)
@@ -656,8 +689,8 @@ def report(
         feet[SHEAR_X][index], feet[SHEAR_Y][index] = -fx / stiffness, -fy / stiffness
         feet[SHEAR_TURN][index] = -moment / torsional if radius > 0.0 else 0.0
         feet[SLIP_SPEED][index] = slid / dt
-        home_x = model.home_x[index] + feet[OFFSET_X][index]
-        home_y = model.home_y[index] + feet[OFFSET_Y][index]
+        home_x = model.trunk.home_x[index] + feet[OFFSET_X][index]
+        home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
         feet[MARKER_X][index] = body[X] + cosine * home_x - sine * home_y
         feet[MARKER_Y][index] = body[Y] + sine * home_x + cosine * home_y
     body[PUSH_X], body[PUSH_Y] = total_x, total_y

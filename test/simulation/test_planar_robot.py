@@ -501,7 +501,7 @@ def test_hips_are_where_the_legs_begin():
     """Hips of the CH3-R: middle legs 138 mm to the side, front legs 119 mm ahead and 69 mm to
     the side."""
     model = robot_of(scene_of()).model
-    hips = np.column_stack([model.hip_x, model.hip_y])
+    hips = np.column_stack([model.trunk.hip_x, model.trunk.hip_y])
     assert hips[1] == pytest.approx([0.0, 0.138], abs=1e-6)
     assert hips[0] == pytest.approx([0.119, 0.069], abs=5e-4)
     assert np.hypot(*(np.array(BODY.homes) - hips).T) == pytest.approx(0.086)
@@ -510,7 +510,7 @@ def test_hips_are_where_the_legs_begin():
 def test_soles_turn_by_the_angle_of_their_leg():
     """Over a stance without slip the gait turns a sole by the angle that its leg turns."""
     robot = PlanarRobot(scene_of(friction=5.0), DRY, 0.001, soles_turn=True)
-    hips = np.column_stack([robot.model.hip_x, robot.model.hip_y])
+    hips = np.column_stack([robot.model.trunk.hip_x, robot.model.trunk.hip_y])
 
     def bearing(index):
         x = BODY.homes[index][0] + robot.table[planar_step.OFFSET_X][index] - hips[index][0]

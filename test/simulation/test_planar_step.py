@@ -41,7 +41,9 @@ def table():
 def test_gait(time, cycle, duty, stride):
     gait = WalkingGait(cycle, stride, duty, 0.03, SCENE.gait.middles, pushes=True)
     own = MODEL._replace(
-        cycle=cycle, stride=stride, duty=duty, lift=0.03, reach=gait.reach(), heading_gain=0.0
+        gait=MODEL.gait._replace(
+            cycle=cycle, stride=stride, duty=duty, lift=0.03, reach=gait.reach(), heading_gain=0.0
+        )
     )
     feet, body = table(), [0.0] * planar_step.BODY
     planar_step.move_feet(own, body, feet, time, time)
@@ -129,23 +131,26 @@ def test_loads_by_trying_every_set_of_feet():
     """Six feet on uneven ground under random pushes: only feet that would pull have no load."""
     rng = np.random.default_rng(4)
     seen = {'all': 0, 'some': 0, 'tipped': 0}
-    own = MODEL._replace(leg_stiffness=3000.0)
+    own = MODEL._replace(trunk=MODEL.trunk._replace(leg_stiffness=3000.0))
     for _ in range(400):
         feet, body = table(), [0.0] * planar_step.BODY
         # All feet stand, some with less than a full share.
-        feet[planar_step.PHASE] = rng.uniform(0.02, own.duty - 0.02, 6).tolist()
+        feet[planar_step.PHASE] = rng.uniform(0.02, own.gait.duty - 0.02, 6).tolist()
         feet[planar_step.OFFSET_X] = rng.uniform(-0.04, 0.04, 6).tolist()
         feet[planar_step.GROUND] = (rng.choice([0.0, 1e-3, 4e-3]) * rng.normal(size=6)).tolist()
         lean = rng.choice([0.0, 10.0, 60.0]) * rng.uniform(-1.0, 1.0, 2)
         body[planar_step.PUSH_X], body[planar_step.PUSH_Y] = lean
         planar_step.share_loads(own, body, feet)
         weights = np.array(
-            [planar_step.load_share(own.duty, own.overlap, p) for p in feet[planar_step.PHASE]]
+            [
+                planar_step.load_share(own.gait.duty, own.gait.overlap, p)
+                for p in feet[planar_step.PHASE]
+            ]
         )
         places = np.array(SCENE.body.homes) + np.column_stack(
             [feet[planar_step.OFFSET_X], np.zeros(6)]
         )
-        wanted = np.array([own.weight, *(-own.height * lean)])
+        wanted = np.array([own.trunk.weight, *(-own.trunk.height * lean)])
         expected = balanced(weights, places, 3000.0 * np.array(feet[planar_step.GROUND]), wanted)
         if expected is None:
             seen['tipped'] += 1
@@ -168,8 +173,10 @@ def test_three_feet_do_not_feel_the_ground():
         loads.append(feet[planar_step.LOAD])
     assert loads[0] == pytest.approx(loads[1], abs=1e-9)
     # The middle foot balances two corners; the levers are 0.112 m and 0.224 m.
-    half = MODEL.weight * 0.112 / (0.112 + 0.224)
-    assert loads[0] == pytest.approx([MODEL.weight / 3, 0, MODEL.weight / 3, 0, half, 0])
+    half = MODEL.trunk.weight * 0.112 / (0.112 + 0.224)
+    assert loads[0] == pytest.approx(
+        [MODEL.trunk.weight / 3, 0, MODEL.trunk.weight / 3, 0, half, 0]
+    )
 
 
 # --- compiled -----------------------------------------------------------------------------------
