@@ -319,6 +319,45 @@ def ranges(recording: Recording) -> list[Finding]:
     return [problem('joints', f'positions up to {most:.3g} rad (or m)', advice)]
 
 
+def velocities(recording: Recording) -> list[Finding]:
+    """Check that joint velocities are the derivatives of joint positions."""
+    if recording.velocities is None or np.median(np.diff(recording.joint_time)) > LONGEST_STEP:
+        return []  # too few to be integrated
+    found: dict[str, list[tuple[str, float]]] = {}
+    times, q, dq = recording.joint_time, recording.positions, recording.velocities
+    steps = np.diff(times)[:, None]
+    moved = np.vstack([np.zeros(q.shape[1]), np.cumsum(0.5 * (dq[1:] + dq[:-1]) * steps, axis=0)])
+    span = max(1, round(0.1 / float(np.median(steps))))
+    if len(times) < span + FEWEST:
+        return []
+    changes, sums = (values[span:] - values[:-span] for values in (q, moved))
+    for name, change, total in zip(recording.robot.joint_names, changes.T, sums.T, strict=True):
+        if change.std() < 5e-3 and total.std() < 0.02:
+            continue  # it did not move
+        sizes = float(np.linalg.norm(change) * np.linalg.norm(total))
+        fits = float(change @ total) / max(sizes, 1e-12)
+        ratio = float(np.linalg.norm(total) / max(float(np.linalg.norm(change)), 1e-9))
+        if abs(fits) < 0.7:
+            text = 'velocity does not fit the change of position'
+        elif fits < 0.0:
+            text = 'velocity is reversed against position'
+        elif not 0.8 < ratio < 1.25:
+            text = 'velocity is {:.3g} times the change of position'
+        else:
+            continue
+        found.setdefault(text, []).append((name, ratio))
+    advice = 'mend the driver, or leave velocities out of the mapping: differences replace them'
+    all_ = len(recording.robot.joint_names)
+    return [
+        problem(
+            'joints' if len(some) == all_ else f'joint {", ".join(name for name, _ in some)}',
+            text.format(np.median([ratio for _, ratio in some])),
+            advice,
+        )
+        for text, some in found.items()
+    ]
+
+
 class _Pairs(NamedTuple):
     """Pairs of feet that stand over a window: what they show of the rotation of the body.
 

@@ -177,6 +177,7 @@ def examine(recording: Recording, progress: Progress = checks.unseen) -> list[Fi
     if any(each.status == 'problem' for each in found):
         return found  # without times and angles, nothing else can be judged
     found += [*checks.rates(recording), *checks.gravity(recording)]
+    found += checks.velocities(recording)
     moved, fine = checks.turned(recording, progress)
     uneven = checks.levels(fine)
     found += [*moved, *uneven]

@@ -207,8 +207,8 @@ def test_efforts_that_are_reversed_or_absent():
 @pytest.mark.parametrize(
     ('factor', 'what', 'words'),
     [
-        (np.where(np.arange(12) == 4, -1.0, 1.0), 'joints', 'position of FR_thigh_joint does not'),
-        (np.full(12, 180.0 / np.pi), 'joints', 'does not follow its velocity'),
+        (np.where(np.arange(12) == 4, -1.0, 1.0), 'joint FR_thigh_joint', 'reversed against'),
+        (np.full(12, 180.0 / np.pi), 'joints', ' times the change'),
     ],
 )
 def test_velocities_that_are_not_those_of_the_positions(factor, what, words):
