@@ -17,10 +17,6 @@ STUDIES = {
         'methods for liquid on meshes (2 min, with rivals 5)',
     ),
     'walk': ('work_precision.walk.study', 'fidelity levels of a walk (1 min, with Drake 30 min)'),
-    'friction_problems': (
-        'work_precision.friction_problems',
-        'contact problems of other groups (15 min)',
-    ),
     'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (6 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (20 min)'),
