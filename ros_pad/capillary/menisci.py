@@ -379,7 +379,7 @@ def wet_surface(
     >>> from ros_pad.capillary import Mesh, wet_surface
     >>> from ros_pad.contact import WATER
     >>> found = wet_surface(Mesh.dome(1.55e-3, 0.583e-3), WATER)
-    >>> round(1e3 * found.line[:, 2].mean(), 2), found.error < 0.01
+    >>> round(1e3 * float(found.line[:, 2].mean()), 2), found.error < 0.01
     (0.89, True)
     """
     instance('mesh', mesh, Mesh)
