@@ -180,14 +180,15 @@ def perform(
         for child in children:
             child.send_signal(one.pair[1])
         for words, child in zip(commands, children, strict=True):
+            name = words[2] if words[1:2] == ['-m'] else words[0]
             try:
                 status = child.wait(max(0.1, sent + PATIENCE - time.monotonic()))
             except subprocess.TimeoutExpired:
-                one.problems.append(f'{" ".join(words[:3])}: no end after {PATIENCE:g} s')
+                one.problems.append(f'{name}: no end after {PATIENCE:g} s')
                 continue
             one.statuses.append(status)
             if status not in STATUSES:
-                one.problems.append(f'{" ".join(words[:3])}: exit status {status}')
+                one.problems.append(f'{name}: exit status {status}')
         one.ending = time.monotonic() - sent
         errors.seek(0)
         one.errors = errors.read()

@@ -123,8 +123,6 @@ def test_another_file_than_that_of_yade_is_refused(tmp_path, text):
     [
         (('capillary', '--evolver', 'none'), '--evolver: none: no such program'),
         (('capillary', '--yade', 'none'), '--yade: none: no such file'),
-        (('friction_problems', '--siconos', 'none'), '--siconos: none: no such program'),
-        (('friction_problems', 'none'), 'PATH: none: no such file'),
         (('limit_surface', '--rival', 'none'), '--rival: none: no such file'),
         (('labelled_pce', 'none'), 'FOLDER: none: no such file'),
     ],
