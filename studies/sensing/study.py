@@ -6,8 +6,10 @@ without rejection, and legged odometry (gyro, and the mean velocity of the feet 
 feet that roll and with feet that do not. Errors are vectors of x and y. Slips are of settled
 stances, 24 ms after touch-down, faster than 10 mm/s; the alarm is that of ros_pad.estimation with
 a noise of 15 mm/s. A false alarm has no speed above 5 mm/s in its last 60 ms. With --all, walks
-that are harder: long pushes, slopes, other gaits and rates, soft feet, a cheap IMU. With
---picture, sensing.json and sensing.png: time an update against errors.
+that are harder: long pushes, slopes, other gaits and rates, soft feet, a cheap IMU; and where
+methods diverge: all feet slip, no foot stands, feet slide for long, low rates. With --picture,
+sensing.json and sensing.png: time an update against errors; and of --all, sensing_stability.json
+and .png.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from studies import command
 from studies.samples import Flags, runs
-from studies.sensing import chart
+from studies.sensing import chart, stability
 from studies.sensing.methods import METHODS, Track, track_of
 from studies.sensing.walks import COURSES, RAMP, REST, Log, walk
 
@@ -224,7 +226,7 @@ def main(words: Sequence[str]) -> int:
     part = command.parser('sensing', __doc__)
     command.add_count(part, '--seeds', 3, 'walks of each kind')
     command.add_count(part, '--duration', 20, 'length of a walk, s', least=6)
-    part.add_argument('--all', action='store_true', help='all walks')
+    part.add_argument('--all', action='store_true', help='all walks and failures')
     part.add_argument('--picture', action='store_true', help='write sensing.json and sensing.png')
     command.add_out(part)
     options = part.parse_args(words)
@@ -241,5 +243,11 @@ def main(words: Sequence[str]) -> int:
     if options.picture:
         picture = chart.picture(kept, METHODS)
         command.write(options.out, 'sensing', {'rows': kept}, {'sensing': picture})
+    if options.all:
+        found = stability.measure(seeds)
+        shown += f'\n{stability.table(found)}\n\n{stability.summary(found)}'
+        name, document = 'sensing_stability', {'curves': [vars(each) for each in found]}
+        if options.picture:
+            command.write(options.out, name, document, {name: chart.stability(found)})
     command.show(options, kept, shown)
     return 0
