@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Public functions refuse bad arguments with an error that names the argument and its value."""
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -17,8 +16,6 @@ from ros_pad.trials.sweep import Sweep
 
 FOOT = contact.Foot.load('large19')
 ROBOT = robots.Robot.load('go2')
-FACE = capillary.Face.floor(1e-3)
-CENTRE = [0.0, 1.0, 2.0]
 FLOOR = simulation.Floor.uniform(True, 1e-4)
 HEXAPOD = simulation.Scene.load('hexapod_patches')
 RAIL_LEG = simulation.Scene.load('leg_wet_flat')
@@ -50,20 +47,8 @@ CASES = (
     (contact.Film(FOOT).touch_down, (-1e-4,), 'thickness'),
     (capillary.bath_meniscus, (), {'liquid': WATER, 'wall': 1e-3}),
     (capillary.press_wet, ('large', 75e3, 0.1, WATER), 'pad'),
-    (capillary.bath_surface, ('dome', WATER), 'face'),
-    (capillary.bath_surface, (FACE, WATER, 9.81, 24.5), 'sectors'),
-    (capillary.pattern_surface, (FACE, 'water', 4e-3), 'liquid'),
-    (capillary.pattern_surface, (FACE, WATER, 4e-3, 6, None, math.nan), 'volume'),
-    (capillary.pattern_surface, (FACE, WATER, 4e-3, 6, None, 1e-9, 9.81, '24'), 'sectors'),
-    (capillary.spanned, (FACE, 'floor', (0.3, 0.3), (1.0, 1.0)), 'last'),
-    (capillary.spanned, (FACE, FACE, (0.3, 0.3), (1.0, 1.0), 24, 8, -1.0), 'growth'),
+    (capillary.wet_surface, (capillary.Wall.dome(2e-3, 1e-3), 'water'), 'liquid'),
     (capillary.Wall.through, ([1e-3, 2e-3], [0.0, 'top']), 'heights'),
-    (capillary.Face.revolution, ([1e-3, 2e-3], [0.0, math.nan]), 'heights'),
-    (capillary.Face.revolution, ([1e-3], [0.0]), 'radii'),
-    (capillary.Face.plate, (1e-3, '1 mm'), 'heights'),
-    (capillary.Face.floor, (1e-3, CENTRE), 'centre'),
-    (capillary.Face.of_wall, (1e-3,), 'wall'),
-    (capillary.Line.ring, ('floor', [0, 1, 2], 0.5), 'face'),
     (robots.Gait.named, ('tripod', [0.1, 0.2], 1.0, 0.6, 0.03), 'hips'),
     (ROBOT.gravity_torques, (ROBOT.home, -9.81), 'gravity'),
     (ROBOT.joint_positions, ([0.1, 0.0, -0.3],), 'feet'),

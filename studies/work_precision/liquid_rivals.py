@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Surface Evolver and YADE's bridges beside ``ros_pad``: rows for ``python -m studies capillary``.
 
-- Arrays of domes: ``pattern_surface`` and ``wet_pattern`` against Surface Evolver on a twelfth (or
+- Arrays of domes: ``wet_surface`` and ``wet_pattern`` against Surface Evolver on a twelfth (or
   an eighth) of a cell with curved facets, extrapolated by Richardson from its two finest meshes;
   what that changes is given as Evolver's own error.
 - One pad in a wide bath: Evolver against the exact meniscus, as the methods of ros_pad.
@@ -35,7 +35,7 @@ from matplotlib.ticker import LogLocator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ros_pad.capillary import Face, Mesh, Wall, pattern_surface, wet_pattern
+from ros_pad.capillary import Mesh, Wall, wet_pattern, wet_surface
 from ros_pad.contact import bridge
 from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.errors import ConfigError
@@ -58,7 +58,7 @@ FINEST = 3  # how often Evolver refines the mesh of the reference
 STEPS = (1e-3, 1e-4, 1e-5)  # of YADE's meridian, over the radius
 REACH = 8.0  # capillary lengths from a pad to the end of Evolver's bath
 
-OURS, LEVEL = 'pattern_surface', 'wet_pattern'
+OURS, LEVEL = 'wet_surface', 'wet_pattern'
 EVOLVER, CURVED = 'Surface Evolver', 'Surface Evolver, curved facets'
 PART, WHOLE = ', part of a cell', ', whole cell'
 # How often facets are refined, for each way in which Evolver is asked.
@@ -280,21 +280,14 @@ def _in_si(found: evolver.Found, liquid: Liquid) -> dict[str, float]:
 
 def our_arrays(arrays: Sequence[Array]) -> list[Row]:
     """Return the errors of our surfaces of least energy, and of level surfaces."""
-    face = Face.of_wall(Wall.dome(SPHERE, REST))
+    wall = Wall.dome(SPHERE, REST)
 
     def least(array: Array, sectors: int, halved: int) -> dict[str, float]:
-        found = pattern_surface(
-            face,
-            array.liquid,
-            array.pitch,
-            array.sides,
-            pressure=0.0,
-            sectors=sectors,
-            refinements=halved,
+        found = wet_surface(
+            wall, array.liquid, array.cell, sectors, halved, square=array.sides == 4
         )
-        height = float(found.vertices[found.lines[0].vertices, 2].mean())
-        pull = -float(found.forces[0, 2])
-        values = (height, pull, found.volume, found.energy)
+        pull = -float(found.force[2])
+        values = (found.mean_height, pull, found.volume, found.energy)
         return dict(zip(QUANTITIES, values, strict=True))
 
     def level(array: Array) -> dict[str, float]:
@@ -525,7 +518,7 @@ def in_baths(results: Sequence[capillary.Result]) -> list[Compared]:
                 if each.size == size
                 for errors in capillary.errors(each.cases)
             ]
-            method = 'bath_surface' if family == 'minimised' else family + PART
+            method = 'wet_surface' if family == 'minimised' else family + PART
             rows.append(_summed(BATH, method, size, solved))
     return rows
 
