@@ -12,10 +12,7 @@ from ros_pad.commands.command import exit_status
 STUDIES = {
     'contact': ('work_precision.contact', 'methods for the contact model (15 s)'),
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
-    'capillary': (
-        'work_precision.capillary',
-        'methods for liquid on meshes (2 min, with rivals 5)',
-    ),
+    'capillary': ('work_precision.capillary', 'methods for liquid on meshes (2 min)'),
     'walk': ('work_precision.walk.study', 'fidelity levels of a walk (1 min, with Drake 30 min)'),
     'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (6 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),

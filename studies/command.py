@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import inspect
 import json
 import pathlib
@@ -173,8 +172,7 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
     name : str
         Name of the study, and of its JSON file.
     study : module
-        Module with ``measure``, ``figures`` and, for a table of its own form, ``table``. Its
-        ``rivals``, if any, names a module that adds options, rows, a table and pictures.
+        Module with ``measure``, ``figures`` and, for a table of its own form, ``table``.
     words : sequence of str
         Arguments of the command line.
 
@@ -188,28 +186,18 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
     brief = 'cycles' in inspect.signature(study.measure).parameters
     if brief:
         add_count(part, '--cycles', None, 'gait cycles of each walk, for a short run')
-    rivals = importlib.import_module(study.rivals) if hasattr(study, 'rivals') else None
-    if rivals:
-        rivals.add_options(part)
     options = part.parse_args(words)
     chosen = {'cycles': options.cycles} if brief else {}
     folder = options.out or new_folder(None, f'chart_{name}')
     with bar(f'{name}: measuring', 100.0, '%') as reach:
         results = study.measure(lambda share: reach(100.0 * share), **chosen)
-    if rivals:
-        with bar(f'{name}: rivals', 100.0, '%') as reach:
-            results += rivals.measure(options, lambda share: reach(100.0 * share))
     with bar(f'{name}: drawing', 100.0, '%') as reach:
         pictures = study.figures(results, lambda share: reach(100.0 * share))
-        if rivals:
-            pictures |= rivals.figures(results)
     rows = [asdict(result) for result in results]
     write(folder, name, {'rows': rows}, pictures)
     if options.json:
         print(json.dumps(rows))
         return 0
     print(getattr(study, 'table', comparison.table)(results))
-    if rivals:
-        print(rivals.table(results))
     print(f'table and pictures: {folder}')
     return 0

@@ -39,8 +39,8 @@ def _lost(friction: float, tow: float) -> float:
     return min(0.5, max(0.0, light + (tow - 1.1) / 3.4 * (heavy - light)))
 
 
-def walk(scene: Scene, policy: Policy, start: str, seed: int) -> tuple[float, int]:
-    """Return the distance a cycle, m, and the number of switches."""
+def walk(scene: Scene, policy: Policy, start: str, seed: int) -> float:
+    """Return the distance a cycle, m."""
     gait, floor = scene.gait, scene.floor.build(seed)
     assert isinstance(gait, WalkingGait) and isinstance(scene.body, LeggedBody)
     random = np.random.default_rng([seed, 7])
@@ -93,4 +93,4 @@ def walk(scene: Scene, policy: Policy, start: str, seed: int) -> tuple[float, in
         pull = tow.weight * (tow.friction_wet if sled else tow.friction_dry)
         lost = _lost(sum(grips) / len(grips), pull)
         body += gait.stride * (1.0 - 2.0 * lost) * PERIOD / gait.cycle
-    return body / scene.cycles, sum(controller.switches.values())
+    return body / scene.cycles

@@ -25,10 +25,7 @@ from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.meniscus import THESIS_LIQUID, WATER, hysteresis_force, meniscus
 from ros_pad.contact.pad import LARGE_PAD, Array, Pad
 from ros_pad.contact.resistance import Foot
-from ros_pad.contact.squeeze import trapped_film
 from ros_pad.errors import ConfigError, NoEquilibrium
-from ros_pad.simulation.margin import SOLE_MODULUS
-from ros_pad.simulation.terms import Term as Omission
 from studies.thesis.bench_scene import (
     BenchScene,
     FootBench,
@@ -36,7 +33,7 @@ from studies.thesis.bench_scene import (
     PressBench,
     TangentialBench,
 )
-from studies.thesis.explained import MINIMAL, Claim
+from studies.thesis.explained import MINIMAL, Claim, Omission, claim, left_out, notes
 from studies.thesis.sole import rise
 
 FIDELITY = 'analytic'
@@ -109,19 +106,9 @@ class Row:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the row for JSON."""
-        return {
-            'figure': self.figure,
-            'quantity': self.quantity,
-            'unit': self.unit,
-            'model': self.model,
-            'condition': self.condition,
-            'pressure_pa': self.pressure,
-            'force_n': self.force,
-            'modelled': self.modelled,
-            'measured': self.measured,
-            'error': self.error,
-            'claimed': self.claimed,
-        }
+        found = dataclasses.asdict(self)
+        pressure, force = found.pop('pressure'), found.pop('force')
+        return found | {'pressure_pa': pressure, 'force_n': force, 'error': self.error}
 
 
 @dataclass(frozen=True)
@@ -161,7 +148,7 @@ class BenchTrial:
             'rows': [row.as_dict() for row in self.rows],
             'claims': [claim.as_dict() for claim in self.claims],
             'notes': list(self.notes),
-            'omitted': [dataclasses.asdict(each) for each in self.omitted],
+            'omitted': [each._asdict() for each in self.omitted],
         }
 
 
@@ -227,21 +214,8 @@ def _inflation(scene: BenchScene, setup: InflationBench, measured: Measurements)
         tuple(rows),
         _inflation_claims(setup, rows, stiffness),
         {'height': Curve(p, curve.height), 'sphere radius': Curve(p[1:], curve.sphere_radius[1:])},
-        (
-            'The measured caps are spheres through the rim with the height from the program of '
-            'the thesis; their radius was not measured but follows from height and pad radius.',
-            f"k = {pad.stiffness:g} N/m belongs to the thesis' pressure law (3.41, 3.60) alone: "
-            'with another law, the same membrane has another k.',
-        ),
-        (
-            Omission(
-                'change of the stiffness with deformation',
-                float(np.max(np.abs(stiffness / pad.stiffness - 1.0))),
-                'relative, of k: from the k that gives each measured height',
-            ),
-            Omission('bending of the skin', None, 'a membrane has none; the skin is 0.4 mm thick'),
-            Omission('errors of the microscope', None, 'the thesis gives one value for a point'),
-        ),
+        notes('inflation', k=pad.stiffness),
+        left_out('inflation', stiffness=float(np.max(np.abs(stiffness / pad.stiffness - 1.0)))),
     )
 
 
@@ -252,53 +226,39 @@ def _inflation_claims(
     within = int(np.sum(np.abs(error) <= setup.claimed_error))
     section = '3.2.1'
     return (
-        Claim(
-            14,
-            "Outline of the free dome at 75 kPa, by the thesis' program.",
+        claim(
+            'outline of the free',
             f'{1e3 * inflate(LARGE_PAD, 75e3).height:.16g} mm high.',
             (float(inflate(LARGE_PAD, 75e3).height),),
             bool(abs(inflate(LARGE_PAD, 75e3).height / PRINTED_HEIGHT - 1.0) < 1e-15),
-            '3.2.1, 7.2.2',
-            printed=f'{1e3 * PRINTED_HEIGHT:.16g} mm',
-            rule='To 15 digits. It shows that both solve the same equation, no more.',
-            same=True,
         ),
-        Claim(
-            15,
-            'Calculated heights and radii of free domes are near the measured ones.',
+        claim(
+            'calculated heights and radii',
             f'Height: {_percents(error)}; sphere radius: '
             f'{_percents(_errors(_pick(rows, "sphere radius")))} ({len(error)} domes, each '
             f'measured once). {within} of {len(error)} heights are within.',
             tuple(error.tolist()),
             within == len(error),
-            section,
+            section=section,
             printed=f'±{100.0 * setup.claimed_error:g} %',
-            rule='All heights within it. k = 40 N/m is that of the thesis; the best is 40.3.',
-            see=FREE_DOME,
         ),
-        Claim(
-            15,
-            'Errors grow with pressure.',
+        claim(
+            'errors grow with pressure',
             f'{_percents(np.abs(error), sign=False)}: '
             + ('they do.' if _rises(np.abs(error)) else 'they do not.'),
             tuple(np.abs(error).tolist()),
             _rises(np.abs(error)),
-            section,
-            rule='Errors of the heights, by pressure.',
-            see=FREE_DOME,
+            section=section,
         ),
-        Claim(
-            15,
-            'The stiffness k grows with strain, hence those errors.',
+        claim(
+            'the stiffness k grows',
             'The k that gives each measured height '
             + ('rises: ' if _rises(stiffness) else 'falls: ' if _rises(-stiffness) else 'is: ')
             + ', '.join(f'{k:.2f}' for k in stiffness)
             + ' N/m.',
             tuple(stiffness.tolist()),
             _rises(stiffness),
-            section,
-            rule='By the law of the thesis, which k belongs to.',
-            see=FREE_DOME,
+            section=section,
         ),
     )
 
@@ -340,25 +300,8 @@ def _press(scene: BenchScene, setup: PressBench, measured: Measurements) -> Benc
         tuple(rows),
         _press_claims(rows, readings, points, pressure),
         curves,
-        (
-            'Text and program of the thesis disagree on the three normal forces. The figures of '
-            'the thesis were made with the program; every figure and table here has the forces of '
-            'text and program.',
-            'Height, depth and sphere radius are those of the sphere through rim and edge of '
-            'contact, as the thesis takes them from its measurements. This is so for the exact '
-            'membrane, too, although its wall is no sphere.',
-            'The membrane has the energy of the thesis, and no adhesion.',
-        ),
-        (
-            Omission(
-                'wall that is no sphere',
-                float(np.max(np.abs(sphere / exact - 1.0))),
-                "relative, of the gap: thesis' sphere over exact membrane at the points",
-            ),
-            Omission('friction of the plate', None, 'skin that sticks does not stretch freely'),
-            Omission('bending of the skin', None, 'a membrane has none; the skin is 0.4 mm thick'),
-            Omission('errors of the microscope', None, 'the thesis gives one value for a point'),
-        ),
+        notes('press'),
+        left_out('press', wall=float(np.max(np.abs(sphere / exact - 1.0)))),
     )
 
 
@@ -409,58 +352,38 @@ def _press_claims(
     high = _modelled(_pick(rows, 'gap', 'thesis', CODED)) / _modelled(exact) - 1.0
     domes = f'{len(coded)} domes, each measured once'
     claims = (
-        Claim(
-            16,
-            'Normal forces on the pressed domes.',
+        claim(
+            'normal forces on the',
             f'The program of the appendix has {_numbers(coded, "g")} N: '
             f'{_percents(coded / text - 1.0)}. Measured points are compared with these.',
             tuple(coded.tolist()),
             True if np.allclose(text, coded, rtol=1e-3) else None,
-            '3.2.1',
             printed=f'{_numbers(text, "g")} N',
-            rule='Text and program within 0.1 %.',
-            missing='the forces that were applied',
-            see=PRESSED_DOME,
         ),
         *(_agreement(rows, domes, *each) for each in _PRESSED_POINTS),
-        Claim(
-            16,
-            'The wall of the pressed dome is a sphere (Fig. 6d, 3.48).',
+        claim(
+            'the wall of the',
             'The gap of the sphere differs from that of the exact membrane of the same energy by '
             f'{_percents(high)}; from the measured gap the sphere differs by {_percents(gap)}, '
             f'the membrane by {_percents(_errors(exact))} ({domes}): where the sphere is nearer, '
             'its error compensates another.',
             tuple(high.tolist()),
             bool(np.all(np.abs(high) <= MINIMAL)),
-            '3.1.1',
-            rule=f'Gaps within {100.0 * MINIMAL:g} %.',
-            see='model/membrane.md',
         ),
-        Claim(
-            18,
-            'The contact carries the load with the pressure of the air (3.53; adhesion is small).',
+        claim(
+            'the contact carries the',
             f'Load over measured contact area, against {1e-3 * pressure:g} kPa: '
             + '; '.join(f'{_numbers(1e-3 * p, ".0f")} kPa ({c})' for c, p in carried.items())
             + f' ({domes}).',
             tuple(carried[CODED].tolist()),
             bool(np.all(np.abs(carried[CODED] / pressure - 1.0) <= MINIMAL)),
-            '3.1.1',
-            rule=f'Its own points within {100.0 * MINIMAL:g} %. 3.53 is exact for a membrane: '
-            'what is refuted is that these points are of domes of 75 kPa.',
-            see=PRESSED_DOME,
         ),
-        Claim(
-            18,
-            'Height, contact radius and depth are of one sphere.',
+        claim(
+            'height contact radius and',
             'The depth in the program differs from that of the sphere with the height and contact '
             f'radius there by {_percents(odd)} ({domes}).',
             tuple(odd.tolist()),
             bool(np.all(np.abs(odd) <= ON_ONE_SPHERE)),
-            '3.2.1',
-            rule=f'Within {100.0 * ON_ONE_SPHERE:g} %. The height was computed by this very '
-            'formula: no evidence for a sphere.',
-            same=True,
-            see=PRESSED_DOME,
         ),
     )
     return claims if TEXT in readings else claims[1:]
@@ -479,18 +402,14 @@ def _agreement(
 ) -> Claim:
     error = {each: _errors(_pick(rows, each, 'thesis', CODED)) for each in quantities}
     found = np.concatenate(list(error.values()))
-    return Claim(
-        figure,
-        f'Calculated {what} of pressed domes beside measured ones.',
+    return claim(
+        'calculated outline of pressed',
         '; '.join(f'{each} {_percents(values)}' for each, values in error.items())
         + f' ({domes}).',
         tuple(found.tolist()),
         None,
-        '3.2.1',
-        printed='none stated',
-        rule='Errors with the forces of the program.',
-        missing='an error that is allowed, and the scatter of each point',
-        see=PRESSED_DOME,
+        figure=figure,
+        thesis=f'Calculated {what} of pressed domes beside measured ones.',
     )
 
 
@@ -608,16 +527,13 @@ def _tangential(scene: BenchScene, setup: TangentialBench, measured: Measurement
         tuple(rows),
         _tangential_claims(scene, setup, rows, curves, ends),
         curves,
-        (
-            'The thesis gives no friction, no shear strength and no film. Those of the foot are '
-            'assumed such that the statements of the thesis hold: this proves only that one '
-            'small model can fulfil all of them.',
-            f'One pad on a sole of {2e3 * foot.sole_radius:g} mm, {foot.shear_stiffness:.0f} N/m '
-            f'of shear stiffness, {1e3 * setup.film_thickness:g} mm of liquid, a stage that '
-            f'starts {setup.dwell:g} s after touch-down: all assumed. Its '
-            f"{1e3 * setup.speed:g} mm/s are the thesis'.",
-            'The program of the thesis contains no measured point of figures 20, 21 and 10: only '
-            'the force limits, where the curves of the domes end, can be compared.',
+        notes(
+            'tangential',
+            sole=2e3 * foot.sole_radius,
+            stiffness=foot.shear_stiffness,
+            film=1e3 * setup.film_thickness,
+            dwell=setup.dwell,
+            speed=1e3 * setup.speed,
         ),
         _tangential_omitted(scene, rows),
     )
@@ -670,12 +586,12 @@ def _rise(setup: TangentialBench) -> tuple[list[Row], dict[str, Curve]]:
         near = np.linspace(radii[max(best - 1, 0)], radii[min(best + 1, len(radii) - 1)], 1001)
         heights = rise(near, liquid, reading)
         best = int(np.nanargmax(heights))
-        for quantity, value, claim in (
+        for quantity, value, stated in (
             ('radius of greatest rise', near[best], claimed),
             ('greatest rise', heights[best], NOT_CODED),
         ):
             rows.append(
-                Row(10, quantity, 'm', name, 'water, 60°', None, None, float(value), None, claim)
+                Row(10, quantity, 'm', name, 'water, 60°', None, None, float(value), None, stated)
             )
     return rows, curves
 
@@ -718,57 +634,41 @@ def _tangential_claims(
     drawn = _drawn(scene, setup, pressures[middle], float(limits[middle]))
     section = '3.2.2'
     return (
-        Claim(
-            20,
-            f'Dry, the flat pad holds most, up to {setup.highest_load:g} N.',
+        claim(
+            'dry the flat pad',
             f'At least {dry:.2f} times what a dome holds under the same load '
             f'({_above(drawn.flat_over_dome_dry, 1.0)}).',
             (dry,),
             dry > 1.0,
-            section,
-            rule='Above 1.',
-            tuned=TUNED_FRICTION,
-            see=FOOT,
+            thesis=f'Dry, the flat pad holds most, up to {setup.highest_load:g} N.',
+            section=section,
         ),
-        Claim(
-            20,
-            'Wet, the flat pad loses much of it, and domes hold more.',
+        claim(
+            'wet the flat pad',
             f'It keeps at most {flat_left:.2f} of its dry force; a dome holds at least {wet:.1f} '
             f'times as much ({_above(drawn.dome_over_flat_wet, 1.0)}). '
             f'{_smallest_sole(scene, setup, limits)}',
             (flat_left, wet),
             wet > 1.0 and flat_left < 0.5,
-            section,
-            rule='Loses more than half; a dome holds more. Rigid discs: a soft pad that is loaded '
-            'at once floats on any sole.',
-            tuned=TUNED_FRICTION + ', width of the sole',
-            see='model/film.md#what-a-flat-sole-does',
+            section=section,
         ),
-        Claim(
-            20,
-            'Domes hold nearly the same wet and dry.',
+        claim(
+            'domes hold nearly the',
             f'They lose at most {100.0 * lost:.1f} % (wet over dry '
             f'{_above(drawn.dome_wet_over_dry, 0.9)}).',
             (lost,),
             lost <= MINIMAL,
-            section,
-            rule=f'Up to {100.0 * MINIMAL:g} %. Rigid discs: a soft dome is 98 % dry only if its '
-            'load comes in 0.1 s or more; loaded at once 9 to 13 %.',
-            tuned=TUNED_FRICTION,
-            see='model/film.md#the-load-comes-slowly',
+            section=section,
         ),
         _adds_claim(
             drawn, _pick(rows, 'wet less dry'), _pick(rows, 'capillary force', BOUND), ends
         ),
-        Claim(
-            20,
-            'More pressure raises the limit of the load, and with it the tangential force.',
+        claim(
+            'more pressure raises the',
             f'At their limits the domes hold {_numbers(ends, ".3f")} N, dry.',
             tuple(ends.tolist()),
             _rises(ends),
-            section,
-            rule='Both rise. Limits are those measured; the rest holds with any friction that '
-            'grows with the load.',
+            section=section,
         ),
         *_limits_claims(scene.pad, rows, limits),
         _stiffer_claim(scene.pad, _pick(rows, 'force limit', 'max_depth')),
@@ -824,18 +724,11 @@ def _adds_claim(drawn: _Draws, less: Sequence[Row], bound: Sequence[Row], ends: 
         f'%. With them the dome of 75 kPa gains {100.0 * low:.1f} to {100.0 * high:+.2f} % (5 to '
         f'95 %; {_above(drawn.gain_with_lines, 0.0)}).'
     )
-    return Claim(
-        20,
-        'Title: liquid adds to what a dome holds; F_cap = F_wet − F_dry is above 0.',
+    return claim(
+        'title liquid adds to',
         ours.replace('-', '−'),
         (*lost.tolist(), float(low), float(high)),
         True if low > 0.0 else False if high < 0.0 else None,
-        'title, 3.2.2',
-        printed='more, no number',
-        rule='Decided if 5 to 95 % of draws are on one side of 0. What the thesis calls F_cap '
-        'also holds the dry friction that the film takes away.',
-        missing='F_wet and F_dry of Fig. 20, to 0.1 %',
-        see='model/foot.md#the-foot-of-chapter-43',
     )
 
 
@@ -848,31 +741,22 @@ def _limits_claims(pad: Pad, rows: Sequence[Row], limits: Array) -> tuple[Claim,
     )
     printed = f'{_numbers(limits, "g")} N'
     return (
-        Claim(
-            20,
-            'A dome bears what the energy of its air can balance.',
+        claim(
+            'a dome bears what',
             f'The model carries until the dome is flat, {_numbers(ratio, ".1f")} times what was '
             f'measured ({len(limits)} domes). No law of pressure times area fits.',
             tuple(ratio.tolist()),
             bool(np.all(np.abs(ratio - 1.0) <= MINIMAL)),
-            '3.2.2',
             printed=printed,
-            rule=f'Within {100.0 * MINIMAL:g} % of the measured limits.',
-            see=PRESSED_DOME,
         ),
-        Claim(
-            20,
-            'Measured limits of the load at 65, 75 and 85 kPa.',
+        claim(
+            'measured limits of the',
             f'The line `measured`: {_percents(np.asarray(line) - 1.0)}. Without a fitted number '
             f'`thickness`: {_percents(np.asarray(default) - 1.0)}.',
             tuple(np.asarray(line).tolist()),
             bool(np.all(np.abs(np.asarray(line) - 1.0) <= MINIMAL)),
-            '3.2.2',
             printed=printed,
-            rule=f'Within {100.0 * MINIMAL:g} % by the line. At 65 kPa no criterion without a '
-            'fit is.',
             tuned=f'the two constants of the line, to these {len(limits)} points',
-            see=LIMITS,
         ),
     )
 
@@ -886,26 +770,20 @@ def _stiffer_claim(pad: Pad, limits: Sequence[Row]) -> Claim:
         / force_limit(pad, pressures, criterion)
         for criterion in ('thickness', 'max_depth', 'flattening')
     }
-    return Claim(
-        20,
-        'A harder silicone (Dragon Skin 20 or 30 for 10) raises the limit of the load.',
+    return claim(
+        'a harder silicone dragon',
         f'A pad {STIFFER:g} times as stiff carries, at 65, 75 and 85 kPa, '
         + '; '.join(f'{_numbers(each, ".2f")} times by `{name}`' for name, each in raised.items())
         + '. A membrane of the material agrees.',
         tuple(np.concatenate([np.atleast_1d(each) for each in raised.values()]).tolist()),
         bool(all(np.all(each > 1.0) for each in raised.values())),
-        '3.2.2',
-        printed='none',
-        rule='Above 1 at the same pressure. True only if the pressure rises with the stiffness.',
-        see='model/force_limit.md#scaling',
     )
 
 
 def _capillary_claim(rows: Sequence[Row]) -> Claim:
     capillary = {name: _modelled(_pick(rows, 'capillary force', name)) for name in CAPILLARY}
-    return Claim(
-        21,
-        'Measured and estimated capillary forces (3.82) agree, errors included.',
+    return claim(
+        'measured and estimated capillary',
         'Estimates: '
         + '; '.join(
             f'{name} {1e3 * force.min():.3f} to {1e3 * force.max():.3f} mN'
@@ -914,11 +792,6 @@ def _capillary_claim(rows: Sequence[Row]) -> Claim:
         + '.',
         tuple(float(force.max()) for force in capillary.values()),
         None,
-        '3.2.2',
-        printed='10 to 26 %',
-        rule='Readings of 3.82 differ by a factor of 20.',
-        missing='the points of Fig. 21, and the tensions of its estimate',
-        see='errata.md#liquid-ring',
     )
 
 
@@ -929,18 +802,14 @@ def _rise_claim(setup: TangentialBench, rows: Sequence[Row]) -> Claim:
         for name, radius in best.items()
         if setup.claimed_smallest <= radius <= setup.claimed_largest
     ]
-    return Claim(
-        10,
-        'Liquid rises highest between domes of an optimal pad radius.',
+    return claim(
+        'liquid rises highest between',
         'The greatest rise is at '
         + '; '.join(f'{1e3 * radius:.3f} mm ({name})' for name, radius in best.items())
         + f': in that range by {_join(inside) if inside else "no reading of 3.101"}.',
         tuple(best.values()),
         bool(inside),
-        '3.1.3',
         printed=f'{1e3 * setup.claimed_smallest:g} to {1e3 * setup.claimed_largest:g} mm',
-        rule='In the range by any reading.',
-        see=DESIGN,
     )
 
 
@@ -975,27 +844,10 @@ def _tangential_omitted(scene: BenchScene, rows: Sequence[Row]) -> tuple[Omissio
     p = np.array([row.pressure for row in bound])
     load = np.array([row.force for row in bound])
     contact = press(scene.pad, p, load).contact_radius
-    sole = scene.foot.sole_radius
-    return (
-        Omission(
-            'capillary force, in figure 20',
-            max(row.modelled / held[row.pressure, row.force] for row in bound),
-            'relative, of the tangential force: the largest force by hysteresis of the ring',
-        ),
-        Omission(
-            'adhesion that widens the contact',
-            float(np.max(np.pi * contact**2 * p / load - 1.0)),
-            'relative, of the contact area at the loads of the table: 3.53 with and without it',
-        ),
-        Omission('liquid dragged under the pad', None, 'film taken to travel with the foot'),
-        Omission(
-            'dimple of the film',
-            None,
-            'films drain as under rigid discs; under the highest load a soft sole traps'
-            f' {1e6 * trapped_film(sole, SOLE_MODULUS, load.max() / scene.foot.sole_area):.2g} um'
-            ' in the mean, however wide it is',
-        ),
-        Omission('dome leaning over as it is dragged', None, 'shape taken from pressing alone'),
+    return left_out(
+        'tangential',
+        capillary=max(row.modelled / held[row.pressure, row.force] for row in bound),
+        adhesion=float(np.max(np.pi * contact**2 * p / load - 1.0)),
     )
 
 

@@ -44,19 +44,22 @@ from studies.thesis.bench import (
     shape_name,
 )
 from studies.thesis.bench_scene import InflationBench, TangentialBench
+from studies.thesis.explained import drawn
 from studies.thesis.foot_bench import DOME, FLAT, LINES, NONE, ROUGH, SMOOTH, SUCTION
 
 PURPLE, ORANGE = '#CC79A7', '#E69F00'
 _COLOURS = (PURPLE, BLUE, GREEN, VERMILION, ORANGE, BLACK)
 
 
-def draw(trial: BenchTrial) -> dict[str, Drawn]:
-    """Draw all figures of a bench; return them by file name without ending.
+def draw(trial: BenchTrial) -> dict[int, Drawn]:
+    """Draw all figures of a bench; return them by number.
 
     Save them under ``matplotlib.rc_context(PAPER_STYLE)``, which sets fonts and identifiers.
     """
     with matplotlib.rc_context(PAPER_STYLE):
-        return {name: figure(trial) for name, figure in _FIGURES[trial.scene.setup.kind].items()}
+        return {
+            number: figure(trial) for number, figure in _FIGURES[trial.scene.setup.kind].items()
+        }
 
 
 # --- inflation -----------------------------------------------------------------------------------
@@ -85,13 +88,12 @@ def figure_14(trial: BenchTrial) -> Drawn:
     ax.set_ylabel('z / mm')
     ax.set_ylim(-0.05, None)
     legend(figure, handles, columns=3)
-    return Drawn(
+    return drawn(
+        14,
         figure,
-        'Figure 14: free domes',
-        'Profiles of free domes: '
+        alt='Profiles of free domes: '
         + _listed(rows, 'measured {measured:.2f} mm, model {modelled:.2f} mm'),
-        'Solid: model. Dashed: sphere through the rim with the measured height.',
-    )  # fmt: skip
+    )
 
 
 def figure_15(trial: BenchTrial) -> Drawn:
@@ -126,14 +128,10 @@ def figure_15(trial: BenchTrial) -> Drawn:
             Line2D([], [], color=VERMILION, marker='o', ls='', label='measured'),
         ],
     )
-    return Drawn(
+    return drawn(
+        15,
         figure,
-        'Figure 15: height and radius of free domes',
-        'Errors of the height: ' + _listed(heights, '{percent:+.1f} %'),
-        'Numbers at the points are errors of the model. The thesis states errors of ±3 % that '
-        'rise with the pressure because the stiffness rises with deformation; but the stiffness '
-        'that gives the measured heights falls. The sphere radius hardly depends on the height '
-        'here, so its small error says little.',
+        alt='Errors of the height: ' + _listed(heights, '{percent:+.1f} %'),
     )
 
 
@@ -227,27 +225,24 @@ def figure_16(trial: BenchTrial) -> Drawn:
             Line2D([], [], color=BLACK, ls=':', label='contact of the exact membrane'),
         ],
     )
-    return Drawn(
+    return drawn(
+        16,
         figure,
-        f'Figure 16: domes of {_kilopascals(rows["gap"][0])}, pressed',
-        'Profiles of pressed domes. Errors of the gap: '
+        alt='Profiles of pressed domes. Errors of the gap: '
         + _listed(trial.pick('gap', 'thesis', CODED), '{percent:+.1f} %', 'force'),
-        'The same measured domes twice: under the forces of the thesis\' program, and under those '
-        'of its text. Dotted: contact of the exact membrane of the same energy, whose gap is '
-        'smaller.',
-    )  # fmt: skip
+        title=f'Figure 16: domes of {_kilopascals(rows["gap"][0])}, pressed',
+    )
 
 
 def figure_17(trial: BenchTrial) -> Drawn:
     """Draw height and sphere radius of pressed domes over force."""
     figure = Figure(figsize=(WIDE, 3.1), layout='constrained')
     _over_force(trial, figure, ('height', 'sphere radius'))
-    return Drawn(
+    return drawn(
+        17,
         figure,
-        'Figure 17: height and radius of pressed domes',
-        'Errors of the height: '
+        alt='Errors of the height: '
         + _listed(trial.pick('height', 'thesis', CODED), '{percent:+.1f} %', 'force'),
-        _OVER_FORCE,
     )
 
 
@@ -255,12 +250,11 @@ def figure_18(trial: BenchTrial) -> Drawn:
     """Draw contact radius, depth and gap of pressed domes over force."""
     figure = Figure(figsize=(WIDE, 3.1), layout='constrained')
     _over_force(trial, figure, ('contact radius', 'depth', 'gap'))
-    return Drawn(
+    return drawn(
+        18,
         figure,
-        'Figure 18: contact radius and depth of pressed domes, and their gap',
-        'Errors of the contact radius: '
+        alt='Errors of the contact radius: '
         + _listed(trial.pick('contact radius', 'thesis', CODED), '{percent:+.1f} %', 'force'),
-        _OVER_FORCE + ' The gap is what a gauge between pad base and plate reads.',
     )
 
 
@@ -374,13 +368,9 @@ def figure_20(trial: BenchTrial) -> Drawn:
             Line2D([], [], color=BLACK, marker='o', ms=4.5, ls='', label='measured limit'),
         ],
     )
-    return Drawn(
+    return drawn(
+        20,
         figure,
-        'Figure 20: tangential over normal force',
-        'Tangential force over normal force: flat dry highest, domes wet and dry alike, flat wet '
-        'lowest',
-        'Curves of domes end at the measured force limits. The model is a foot with one pad and '
-        'assumed constants: the program of the thesis contains no measured point of this figure.',
     )
 
 
@@ -416,14 +406,14 @@ def figure_21(trial: BenchTrial) -> Drawn:
     ax.set_ylabel('capillary force / mN')
     legend(figure, ax.get_legend_handles_labels()[0], columns=2)
     load = min(row.force for row in rows if row.force is not None)
-    return Drawn(
+    return drawn(
+        21,
         figure,
-        'Figure 21: capillary force of a dome',
-        'Capillary force over pressure by three versions of the estimate and by a bound',
-        f'Symbols: under {load:g} N, which all domes bear; strokes: under the measured limit of '
-        'each. The thesis states errors of 10 to 26 % against measurements whose numbers it does '
-        'not give; the versions of its estimate differ by far more. A ring that is the same all '
-        'round has no net tangential force: only hysteresis, up to the bound, can resist.',
+        caption=f'Symbols: under {load:g} N, which all domes bear; strokes: under the measured '
+        'limit of each. The thesis states errors of 10 to 26 % against measurements whose numbers '
+        'it does not give; the versions of its estimate differ by far more. A ring that is the '
+        'same all round has no net tangential force: only hysteresis, up to the bound, can '
+        'resist.',
     )
 
 
@@ -463,18 +453,14 @@ def figure_10(trial: BenchTrial) -> Drawn:
     ax.set_xlabel('pad radius / mm')
     ax.set_ylabel('height of rise / mm')
     legend(figure, handles, columns=2)
-    return Drawn(
+    return drawn(
+        10,
         figure,
-        'Figure 10: rise of liquid between the domes',
-        'Height of rise over pad radius by three versions of 3.101; greatest at '
+        alt='Height of rise over pad radius by three versions of 3.101; greatest at '
         + ', '.join(
             f'{1e3 * row.modelled:.2f} mm ({row.model})'
             for row in trial.pick('radius of greatest rise')
         ),
-        'Equation 3.101 as typed lacks a factor of height, so its result depends on the unit of '
-        'length: all lengths in millimetres, or the capillary area in m² as the constants are '
-        'given. These two versions have no solution for small pads. Below 1 mm the corrected '
-        'equation fills the gap between the domes. No version gives the claimed optimum.',
     )
 
 
@@ -507,14 +493,9 @@ def figure_34(trial: BenchTrial) -> Drawn:
         ax.set_xlim(0.0, None)
         ax.set_xlabel('normal force / N')
     legend(figure, _handles_of_34(), columns=3)
-    return Drawn(
+    return drawn(
+        34,
         figure,
-        'Figure 34: a foot, flat and domed, dry and wet, on smooth and rough plastic',
-        'Tangential over normal force: domes wet and dry alike, flat dry high, flat wet lowest; '
-        'wet less dry force of domes, below 0 without capillary force',
-        'The flat foot is off (b), it loses 0.1 to 2 N. Pinned lines and suction are upper bounds.'
-        ' One-sided force: that of half a ring by 3.82, which the other half cancels. The thesis '
-        'prints no number of its figure.',
     )
 
 
@@ -539,11 +520,11 @@ def _handles_of_34() -> list[Any]:
     ]
 
 
-_FIGURES: dict[str, dict[str, Callable[[BenchTrial], Drawn]]] = {
-    'inflation': {'figure_14': figure_14, 'figure_15': figure_15},
-    'press': {'figure_16': figure_16, 'figure_17': figure_17, 'figure_18': figure_18},
-    'tangential': {'figure_20': figure_20, 'figure_21': figure_21, 'figure_10': figure_10},
-    'foot': {'figure_34': figure_34},
+_FIGURES: dict[str, dict[int, Callable[[BenchTrial], Drawn]]] = {
+    'inflation': {14: figure_14, 15: figure_15},
+    'press': {16: figure_16, 17: figure_17, 18: figure_18},
+    'tangential': {20: figure_20, 21: figure_21, 10: figure_10},
+    'foot': {34: figure_34},
 }
 
 

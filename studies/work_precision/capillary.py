@@ -41,8 +41,6 @@ from studies.work_precision import capillary_chart
 
 Pair = tuple[float, float]  # height, m, and force, N
 
-rivals = 'studies.work_precision.liquid_rivals'  # module of further rows, with its options
-
 SPHERE, REST = 1.55e-3, 0.583e-3  # m: the dome of the reference table
 TENSIONS = (0.004, 0.073)  # N/m: the thesis' highest, and water
 RATIOS = (0.3, 0.5, 0.65, 0.8, 0.95)  # tension of the solid over tension of the liquid

@@ -14,10 +14,7 @@ event-driven integration of its equations of motion, phase by phase, to 1e-11.
 
 Times are those of the steps alone: making the robot is not timed, nor are requests for the state
 of the feet (L2 computes this state in every step, L1 only on request). Drake is stepped from
-Python, which writes forces or coefficients of friction before each step.
-
-Of the laws in studies.work_precision.friction, the hexapod walks only with the elastic one. The
-study stability compares the others.
+Python, which writes forces before each step.
 """
 
 from __future__ import annotations

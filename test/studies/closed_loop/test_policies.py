@@ -34,25 +34,6 @@ def test_ratio_by_hand():
     assert result == {'of_means': 0.99, 'low': 0.98, 'high': 1.0, 'least': 0.98, 'behind': 0.5}
 
 
-def test_walks_that_are_kept_are_not_made_again(tmp_path, monkeypatch):
-    made = []
-
-    def in_processes(task, cases, *_):
-        made.extend(job for job, _, _ in cases)
-        return [task(*case) for case in cases]
-
-    monkeypatch.setattr(policies.command, 'in_processes', in_processes)
-    monkeypatch.setattr(policies, 'walk', lambda job: [0.1, job.seed, None])
-    jobs = [policies.Job('as shipped', 'flat', 1.0, seed, 2) for seed in (1, 2)]
-    kept = tmp_path / 'walks.jsonl'
-    policies.walked(jobs[:1], kept, 1)
-    assert policies.walked(jobs, kept, 1) == {jobs[0]: [0.1, 1, None], jobs[1]: [0.1, 2, None]}
-    assert made == jobs
-    monkeypatch.setattr(policies, '_code', lambda policy: 'another')
-    policies.walked(jobs, kept, 1)
-    assert made == [*jobs, *jobs]
-
-
 def test_the_page_has_the_tables_of_the_last_run():
     document = json.loads((policies.command.CHARTS / 'policies.json').read_text())
     page = policies.PAGE.read_text()
@@ -93,6 +74,5 @@ def test_a_walk_without_dynamics_goes_as_far_as_one_with_dynamics():
         ('dry', 'dome', 97.9),
     ):  # fmt: skip
         ground = replace(scene, floor=replace(scene.floor, kind=kind))
-        distance, switches = quick_walk.walk(ground, policy_named(policy), policy, 0)
+        distance = quick_walk.walk(ground, policy_named(policy), policy, 0)
         assert 1e3 * distance == pytest.approx(expected, rel=0.03)
-        assert switches == 0
