@@ -84,7 +84,7 @@ class TrialLog:
     ) -> Trial:
         """Return the trial with its series, settings and metrics."""
         records = self.records
-        found = series(records)
+        found = series(*records)
         rows = np.isin(records.sample.stamps, found['time'])
         found |= {name: found[name] * 1e-9 for name in ('time', 'slow_time')}
         trial = Trial(
