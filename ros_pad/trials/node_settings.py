@@ -237,7 +237,9 @@ class NodeSettings:
             When a name or value is not allowed; the message names it, and what is allowed.
         """
         known = (*(each.name for each in (*OWN, *POLICY_SETTINGS)), *_ESTIMATOR)
-        tuning, of_policy, changes = {}, {}, {}
+        tuning: dict[str, Any] = {}
+        of_policy: dict[str, Any] = {}
+        changes: dict[str, Any] = {}
         for name, value in (values or {}).items():
             choice('parameter', name, known)
             if name in _ESTIMATOR:
@@ -254,7 +256,7 @@ class NodeSettings:
                 self,
                 **changes,
                 foot=self.foot if foot is None else Foot.load(foot),
-                tuning=replace(self.tuning, **tuning),  # type: ignore[arg-type]
+                tuning=replace(self.tuning, **tuning),
                 policy=policy,
                 policy_parameters=self.policy_parameters | of_policy,
             )

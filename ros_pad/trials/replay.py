@@ -355,7 +355,7 @@ def _inputs(bag: BagReader, recording: Recording, settings: NodeSettings) -> _In
         name: each._replace(legs=legs, block=Block(each.block.stamps, each.block.rows[:, places]))
         for name, each in recording.streams.items()
     }
-    needed = ('force', 'position')
+    needed: tuple[str, ...] = ('force', 'position')
     if settings.tuning.source == 'joints':
         needed = ('force', 'position', 'velocity')
     gaps = [
