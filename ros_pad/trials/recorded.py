@@ -100,6 +100,8 @@ def load(
     settings['late'] = []
     with contextlib.suppress(BagError):  # a trial can be read without it
         settings['late'] = late(bag, part(progress, 0.8, 1.0))
+    if progress:
+        progress(1.0)
     found = series(*(recording.streams[kind.name].block for kind in KINDS))
     body, odom = (_poses(recording, topic, found['time']) for topic in (BODY_POSE, ODOM))
     if body is None:

@@ -381,7 +381,7 @@ def _inputs(bag: BagReader, recording: Recording, settings: NodeSettings) -> _In
 def _leave_out(streams: dict[str, Stream]) -> str:
     """Leave out what no replay can have; return a note on samples among it."""
     samples = streams['sample']
-    stamps = samples.block.stamps
+    stamps, (made, rows) = samples.block.stamps, streams['estimate'].block
     wide = _wide(stamps)
     for name in ('estimate', 'command'):
         # Between samples, nodes tell of silent feet, with stamps that no replay has.
@@ -389,9 +389,8 @@ def _leave_out(streams: dict[str, Stream]) -> str:
         there = np.isin(np.searchsorted(stamps, own) - 1, wide) | np.isin(own, stamps)
         streams[name] = streams[name].where(there)
     # An estimator makes its first estimate of its first sample.
-    own, rows = streams['estimate'].block
-    begun = np.isin(own, stamps) | np.isfinite(rows['load']).any(axis=1)
-    kept = stamps >= own[begun].min(initial=np.iinfo(np.int64).max)
+    begun = np.isin(made, stamps) | np.isfinite(rows['load']).any(axis=1)
+    kept = stamps >= made[begun].min(initial=np.iinfo(np.int64).max)
     if kept.all() or not kept.any():  # none, where there are no estimates
         return ''
     streams['sample'] = samples.where(kept)
