@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import os
@@ -15,7 +14,7 @@ from ros_pad.configuration import Setting, choice
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphologies, policy_named
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
-from ros_pad.control.policies import PREFIX, Policy
+from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
 from ros_pad.errors import BagError, ConfigError, InvalidInput, LimitError, reason
 from ros_pad.estimation import SETTINGS, Tuning
@@ -55,8 +54,7 @@ Value: TypeAlias = 'float | int | bool | str'
 
 def body_settings_for(scene: Scene) -> dict[str, Any]:
     """Return the settings of the body estimator for the sensors of a scene, by name."""
-    sensors = scene.sensors
-    share = 0.0
+    sensors, share = scene.sensors, 0.0
     if isinstance(scene.body, LeggedBody) and scene.body.mass != scene.body.robot.mass:
         # The estimator has the mass of the robot's file; the scene's robot has another one.
         share = min(max(0.1 * scene.body.mass / scene.body.robot.mass, 0.01), 0.9)
@@ -116,10 +114,6 @@ class NodeSettings:
         Rate of the estimates, Hz.
     floor : Floor or None
         True ground, which an oracle needs.
-    scene : str
-        Name or path of the scene; empty where it is unknown.
-    seed : int
-        Seed of floor and noise.
     legs : tuple of int
         Numbers of the legs of the robot; empty where they are unknown.
     assumed : tuple of str
@@ -138,8 +132,6 @@ class NodeSettings:
     ambient_pressure: float = AMBIENT_PRESSURE.default
     publish_rate: float = PUBLISH_RATE.default
     floor: Floor | None = None
-    scene: str = ''
-    seed: int = 0
     legs: tuple[int, ...] = ()
     assumed: tuple[str, ...] = ()
 
@@ -167,32 +159,59 @@ class NodeSettings:
             When the foot of the bag is not found.
         """
         about = label.read(bag)
-        settings = _of_label(about)
-        parameters = _parameters(bag)
-        if parameters:
-            try:
-                return _of_nodes(settings, *parameters)
-            except (KeyError, TypeError, ValueError) as error:
-                raise BagError(
-                    f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator'
-                    f' or controller is missing or not valid: {reason(error)}'
-                ) from error
-        if not about.known:
-            assumed = (
-                'the bag lacks the settings of its nodes: foot large37, policy adaptive,'
-                f' expected_load {settings.expected_load:g} N and the default noise are assumed'
-            )
-            return replace(settings, assumed=(assumed,))
+        known = about['settings']
+        settings = cls(
+            Foot.load(known.get('foot', 'large37')),
+            float(known.get('expected_load', EXPECTED_LOAD.default)),
+            Tuning(),
+            about['policy'] or 'adaptive',
+            ambient_pressure=known['ambient_pressure'],
+            floor=about['floor'],
+        )
         try:
-            scene = Scene.load(settings.scene)
+            nodes = list(json.loads(bag.custom_data.get(PARAMETERS, '{}')).values())
+            # Find the nodes by their parameters, because users may rename nodes.
+            found = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
+            controllers = [each for each in nodes if {'policy', 'margin'} <= each.keys()]
+            if len(found) == len(controllers) == 1:
+                return settings._of_nodes(found[0] | controllers[0])
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise BagError(
+                f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator or'
+                f' controller is missing or not valid: {reason(error)}'
+            ) from error
+        try:
+            scene = Scene.load(about['scene'])
         except ConfigError:
-            assumed = f'scene {settings.scene!r} of the bag cannot be read: default noise is used'
+            assumed = (
+                f'the bag lacks the parameters of its nodes, and its scene {about["scene"]!r} is'
+                f' not known: foot {settings.foot.source}, policy {settings.policy}, expected_load'
+                f' {settings.expected_load:g} N and the default noise are assumed'
+            )
             return replace(settings, assumed=(assumed,))
         return replace(
             settings,
             tuning=tuning_for(scene),
             dome_pressure=scene.dome_pressure or 0.0,
             legs=tuple(scene.legs),
+        )
+
+    def _of_nodes(self, values: dict[str, Any]) -> NodeSettings:
+        """Return settings with the recorded parameters of estimator and controller."""
+        floor = self.floor
+        if floor is None and values.get('scene'):
+            floor = Scene.load(values['scene']).floor.build(int(values.get('seed', 0)))
+        tuning = {place: values[name] for name, place in _ESTIMATOR.items() if name in values}
+        of_policy = {each.name: values[each.name] for each in POLICY_SETTINGS}
+        return replace(
+            self,
+            **{each.name: values.get(each.name, getattr(self, each.name)) for each in OWN},
+            foot=Foot.load(values['foot']),
+            tuning=Tuning(**tuning),
+            policy=str(values['policy']),
+            policy_parameters={n.removeprefix(PREFIX): value for n, value in of_policy.items()},
+            floor=floor,
+            legs=tuple(values['legs']),
         )
 
     def changed(
@@ -217,35 +236,30 @@ class NodeSettings:
         ConfigError, InvalidInput
             When a name or value is not allowed; the message names it, and what is allowed.
         """
-        tuning, of_policy, own = {}, {}, {}
-        known = [*(each.name for each in (*OWN, *POLICY_SETTINGS)), *_ESTIMATOR]
+        known = (*(each.name for each in (*OWN, *POLICY_SETTINGS)), *_ESTIMATOR)
+        tuning: dict[str, Any] = {}
+        of_policy: dict[str, Any] = {}
+        changes: dict[str, Any] = {}
         for name, value in (values or {}).items():
-            if name not in known:
-                near = difflib.get_close_matches(name, known, n=1)
-                hint = f' Did you mean {near[0]!r}?' if near else ''
-                raise InvalidInput(
-                    f'parameter {name!r} is unknown.{hint} Allowed: {", ".join(known)}'
-                )
+            choice('parameter', name, known)
             if name in _ESTIMATOR:
                 tuning[_ESTIMATOR[name]] = value
             elif name.startswith(PREFIX):
                 of_policy[name.removeprefix(PREFIX)] = value
             else:
-                own[name] = value
+                changes[name] = value
         policy = policy or self.policy
         try:
             if of_policy:
                 policy_named(policy, parameters=of_policy)  # raises unless policy is adaptive
-            changes: dict[str, Any] = {
-                **own,
-                'tuning': replace(self.tuning, **tuning),  # type: ignore[arg-type]
-                'policy': policy,
-                'policy_parameters': self.policy_parameters | of_policy,
-            }
-            if foot is not None:
-                changes['foot'] = Foot.load(foot)
-            settings = replace(self, **changes)
-            settings.rules()
+            settings = replace(
+                self,
+                **changes,
+                foot=self.foot if foot is None else Foot.load(foot),
+                tuning=replace(self.tuning, **tuning),
+                policy=policy,
+                policy_parameters=self.policy_parameters | of_policy,
+            )
             settings.controller(settings.legs or (1,))
         except (InvalidInput, LimitError) as error:
             given = ', '.join(f'{name}={value}' for name, value in (values or {}).items())
@@ -263,11 +277,6 @@ class NodeSettings:
     def _of_policy(self) -> dict[str, Any] | None:
         return self.policy_parameters if self.policy == 'adaptive' else None
 
-    def rules(self) -> Policy:
-        """Return the policy with its parameters and, for an oracle, the true ground."""
-        is_wet = self.floor.wet if self.floor else None
-        return policy_named(self.policy, is_wet, self._of_policy())
-
     def controller(self, legs: Sequence[int]) -> MorphologyController:
         """Return a new controller.
 
@@ -276,10 +285,11 @@ class NodeSettings:
         legs : sequence of int
             Its legs, from 1.
         """
+        is_wet = self.floor.wet if self.floor else None
         return MorphologyController(
             self.foot,
             legs,
-            self.rules(),
+            policy_named(self.policy, is_wet, self._of_policy()),
             self.expected_load,
             start=first_morphologies(self.policy, legs),
             margin=self.margin,
@@ -287,71 +297,3 @@ class NodeSettings:
             lift_off_share=self.lift_off_share,
             command_timeout=self.command_timeout,
         )
-
-
-def _of_label(about: label.About) -> NodeSettings:
-    """Return the settings that follow from the description of the trial in a bag."""
-    return NodeSettings(
-        Foot.load(about.settings.get('foot', 'large37')),
-        about.expected_load,
-        Tuning(),
-        about.policy or 'adaptive',
-        ambient_pressure=about.ambient_pressure,
-        floor=about.floor.build(about.seed) if about.floor else None,
-        scene=about.scene,
-        seed=about.seed,
-    )
-
-
-def _parameters(bag: BagReader) -> tuple[dict[str, Any], dict[str, Any]] | None:
-    """Return the recorded parameters of estimator and controller.
-
-    None unless the bag has those of exactly one estimator and one controller.
-    """
-    try:
-        nodes = list(json.loads(bag.custom_data.get(PARAMETERS, '{}')).values())
-        # Find the nodes by their parameters, because users may rename nodes.
-        estimators = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
-        controllers = [each for each in nodes if {'policy', 'margin'} <= each.keys()]
-    except (AttributeError, TypeError, ValueError) as error:
-        raise BagError(
-            f'{bag.path}: custom data {PARAMETERS!r} do not list parameters of nodes: {error}'
-        ) from error
-    if len(estimators) == len(controllers) == 1:
-        return estimators[0], controllers[0]
-    return None
-
-
-def _of_nodes(
-    settings: NodeSettings, estimator: dict[str, Any], controller: dict[str, Any]
-) -> NodeSettings:
-    """Return settings with the recorded parameters of the two nodes."""
-    tuning = {place: estimator[name] for name, place in _ESTIMATOR.items() if name in estimator}
-    of_policy = {
-        each.name.removeprefix(PREFIX): controller[each.name]
-        for each in POLICY_SETTINGS
-        if each.name in controller
-    }
-    own = {
-        each.name: controller.get(each.name, each.default)
-        for each in (MARGIN, LIFT_OFF, COMMAND_TIMEOUT)
-    }
-    floor, seed = settings.floor, settings.seed
-    if floor is None and controller.get('scene'):
-        seed = int(controller.get('seed', 0))
-        floor = Scene.load(controller['scene']).floor.build(seed)
-    return replace(
-        settings,
-        foot=Foot.load(controller['foot']),
-        expected_load=float(controller['expected_load']),
-        tuning=Tuning(**tuning),
-        policy=str(controller['policy']),
-        dome_pressure=float(controller['dome_pressure']),
-        policy_parameters=of_policy,
-        **own,
-        ambient_pressure=float(controller.get('ambient_pressure', settings.ambient_pressure)),
-        publish_rate=float(estimator['publish_rate']),
-        floor=floor,
-        seed=seed,
-        legs=tuple(controller['legs']),
-    )

@@ -14,8 +14,8 @@ from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
 from ros_pad.records import ESTIMATE, SAMPLE
+from ros_pad.robots import Robot
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials import replay_body
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay import replay
 
@@ -212,7 +212,7 @@ def test_a_bag_without_its_robots_file_is_replayed_but_for_the_body(walked, monk
     def gone(*_):
         raise ConfigError('mine.yaml: no such file')
 
-    monkeypatch.setattr(replay_body.Robot, 'load', gone)
+    monkeypatch.setattr(Robot, 'load', gone)
     found = replay(BagReader(walked[-1]))
     assert found.verdict == 'equal'
     assert found.notes == ['the body estimator is not replayed: mine.yaml: no such file']

@@ -139,7 +139,7 @@ def test_folders_without_trials(tmp_path):
         sweeps.read(tmp_path / 'new')
     (tmp_path / 'bad').mkdir()
     (tmp_path / 'bad' / table.RESULTS).write_bytes(b'no data base' * 100)
-    with pytest.raises(PadError, match='damaged'):
+    with pytest.raises(PadError, match='not a database'):
         sweeps.read(tmp_path / 'bad')
 
 

@@ -238,7 +238,7 @@ def test_two_robots_in_one_bag(tmp_path):
         bag.add('/b/leg_1/wetness', Float64(data=0.2), 10 * MS)
     with pytest.raises(BagError, match='legs in /a/, legs in /b/'):
         recorded.load(tmp_path / 'bag')
-    with pytest.raises(BagError, match='no legs in namespace /c/'):
+    with pytest.raises(BagError, match='in namespace /c/ is needed'):
         recorded.load(tmp_path / 'bag', namespace='c')
     for namespace in ('b', '/b', '/b/'):
         assert recorded.load(tmp_path / 'bag', namespace=namespace).wet_probability == [[0.2]]

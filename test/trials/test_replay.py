@@ -260,7 +260,7 @@ def test_estimates_may_be_published_more_often(sample):
         ({'wet_priors': 0.3}, "Did you mean 'wet_prior'"),
         ({'wet_prior': 2.0}, 'wet_prior'),
         ({'policy.dwell': -1}, 'policy.dwell=-1'),
-        ({'tow.weight': 3.0}, "'tow.weight' is unknown"),
+        ({'tow.weight': 3.0}, "parameter = 'tow.weight' is not allowed"),
         ({'expected_load': 'much'}, 'expected_load'),
         ({'dome_pressure': 95e3}, 'ceiling of 90000 Pa'),
         ({'margin': 0}, 'margin'),
@@ -298,10 +298,6 @@ def test_parameters_of_other_nodes_are_an_error_of_ours(tmp_path, changes):
     BagWriter(tmp_path / 'bag', {PARAMETERS: json.dumps(said)}).close()
     with pytest.raises(BagError, match='is missing or not valid'):
         NodeSettings.of(BagReader(tmp_path / 'bag'))
-    del controller['dome_pressure']
-    BagWriter(tmp_path / 'other', {PARAMETERS: json.dumps(said)}).close()
-    with pytest.raises(BagError, match=r"not valid: key 'dome_pressure' is missing"):
-        NodeSettings.of(BagReader(tmp_path / 'other'))
 
 
 # --- bags of other robots -----------------------------------------------------------------------
@@ -614,8 +610,8 @@ def test_other_types_are_named(tmp_path, topic, kind):
 @pytest.mark.parametrize(
     ('remaps', 'said'),
     [
-        ({'leg_{leg}/wrenches': '/x_{leg}'}, 'Did you mean leg_{leg}/wrench?'),
-        ({'leg_{leg}/wrench': '/leg_{leg}/fts'}, 'has no topic /leg_{leg}/fts; similar ones are'),
+        ({'leg_{leg}/wrenches': '/x_{leg}'}, "Did you mean 'leg_{leg}/wrench'"),
+        ({'leg_{leg}/wrench': '/leg_{leg}/fts'}, "'/leg_{leg}/fts' is not allowed: one of"),
         ({'leg_1/wrench': '/leg_{leg}/wrench'}, 'on both sides of := or on neither'),
         ({'leg_{leg}/wrench': '/leg_{leg}/wrench', 'leg_1/wrench': '/leg_2/wrench'}, 'already'),
     ],
@@ -698,7 +694,7 @@ def test_a_missing_scene_is_noted(tmp_path):
     }
     path.write_text(yaml.dump(content))
     found = found_in(bag)
-    assert found.notes[0].startswith("scene '/gone/mine.yaml' of the bag cannot be read")
+    assert "scene '/gone/mine.yaml' is not known" in found.notes[0]
     content['rosbag2_bagfile_information']['custom_data'] = {'ros_pad': '[1, 2]'}
     path.write_text(yaml.dump(content))
     with pytest.raises(BagError, match='does not describe a trial'):

@@ -109,7 +109,7 @@ def test_policies_without_parameters_are_walked_once():
         ({'parameters': {'cycles': [2.5]}}, 'cycles=2.5: .* whole number from 1 to 100000'),
         ({'parameters': {'body.mass': ['heavy']}}, "body.mass=heavy: .*'heavy'"),
         ({'parameters': {'foot.friction': [0.3]}}, "foot = 'large19' has no keys below it"),
-        ({'parameters': {'policy': ['flat']}}, '--policy'),
+        ({'parameters': {'policy': ['flat']}}, "parameter = 'policy' is not allowed"),
         ({'parameters': {'estimator.filter_perio': [1]}}, "mean 'filter_period'"),
         ({'parameters': {'wet_prior': [2.0]}}, 'wet_prior=2.0: .*0.01 to 0.99'),
         ({'parameters': {'policy.wet_abov': [0.5]}}, "Did you mean 'policy.wet_above'"),
@@ -225,7 +225,7 @@ def test_more_of_the_same_is_added_and_less_refused(tmp_path: pathlib.Path):
     rows = sweeps.run(more, tmp_path / 'sweep', 1)
     assert [row['seed'] for row in rows] == [1, 0]
     assert rows[1] == first[0]
-    with pytest.raises(InvalidInput, match=r'1 trials that are not in this sweep.*seed=1'):
+    with pytest.raises(InvalidInput, match=r'1 trials that are not in this sweep.*seed'):
         sweeps.run(small, tmp_path / 'sweep', 1)
 
 
@@ -241,7 +241,7 @@ def test_another_sweep_in_the_same_folder_is_refused(tmp_path: pathlib.Path, mon
     with pytest.raises(InvalidInput, match='with fidelity auto, not L0'):
         sweeps.run(dataclasses.replace(sweep, fidelity='L0'), tmp_path / 'sweep', 1)
     mine.write_text(text.replace('mass: ', 'mass: 1'))
-    with pytest.raises(InvalidInput, match=r'scene .*mine.yaml has changed since'):
+    with pytest.raises(InvalidInput, match=r'with scene .*mine.yaml'):
         sweeps.run(sweep, tmp_path / 'sweep', 1)
     mine.write_text(text)
     sweeps.run(sweep, tmp_path / 'sweep', 1)
@@ -257,21 +257,21 @@ def test_folders_that_hold_something_else_are_left_alone(tmp_path: pathlib.Path)
         Results(tmp_path / 'full', {}, [])
     (tmp_path / 'bad').mkdir()
     (tmp_path / 'bad' / table.RESULTS).write_text('no base of data' * 100)
-    with pytest.raises(PadError, match=r'trials.sqlite is damaged'):
+    with pytest.raises(PadError, match=r'trials.sqlite cannot be read'):
         Results(tmp_path / 'bad', {}, [])
 
 
 def test_a_full_disk_is_named(tmp_path: pathlib.Path):
     with Results(tmp_path, {}, ['{}']) as results:
         results._base.execute('PRAGMA max_page_count = 1')  # no page may be added
-        with pytest.raises(PadError, match=r'trials.sqlite cannot be written: .* full'):
+        with pytest.raises(PadError, match=r'trials.sqlite cannot be .* full'):
             results.add('{}', {'text': 'x' * 10_000})
 
 
 def test_a_folder_has_one_sweep_at_work_at_a_time(tmp_path: pathlib.Path):
     with (
         Results(tmp_path / 'sweep', {}, []),
-        pytest.raises(PadError, match='another sweep is running'),
+        pytest.raises(PadError, match='a sweep is running'),
     ):
         Results(tmp_path / 'sweep', {}, [])
     Results(tmp_path / 'sweep', {}, []).__exit__()
