@@ -51,7 +51,7 @@ class _Part:
         """Read the numbers of the part, except what is known."""
         for each in fields(cls):  # type: ignore[arg-type]
             if 'range' in each.metadata and each.name not in known:
-                default = {} if each.metadata['needed'] else {'default': each.default}
+                default: Any = {} if each.metadata['needed'] else {'default': each.default}
                 key = each.metadata['key'] or each.name
                 known[each.name] = table.number(key, *each.metadata['range'], **default)
         return cls(**known)

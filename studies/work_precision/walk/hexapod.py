@@ -72,15 +72,14 @@ def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
 def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     """Return the available walkers, and the names of the references and the baseline of times."""
     walkers = []
-    forms = {'L1': (False, False, False), 'L1, soles turn': (False, True, False)}
+    forms = {'L1': (False, False)}
     if importlib.util.find_spec('numba'):
-        forms['L1, compiled'] = (True, False, False)
-        forms['L1, compiled, walk'] = (True, False, True)
-    for family, (compiled, turning, at_once) in forms.items():
+        forms |= {'L1, compiled': (True, False), 'L1, compiled, walk': (True, True)}
+    for family, (compiled, at_once) in forms.items():
         for step in (1e-3, 4e-3, 1e-2):
-            walkers.append(_planar(family, step, compiled, turning, at_once))
+            walkers.append(_planar(family, step, compiled, at_once))
     if not importlib.util.find_spec('mujoco'):
-        top = _planar('L1', TOP_STEP, False, False, False)
+        top = _planar('L1', TOP_STEP, False, False)
         return [*walkers, top], (top.name,), named('L1', SAMPLE)
     steps = (5e-4, 1e-3, 2e-3, 4e-3)
     walkers += [_full('L2', replace(RECOMMENDED, timestep=step)) for step in steps]
@@ -119,10 +118,10 @@ DRAKE_STEPS = {
 }
 
 
-def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bool) -> Walker:
+def _planar(family: str, step: float, compiled: bool, at_once: bool) -> Walker:
     def walk(case: Walk) -> Walked:
         floor = case.scene.floor.build(case.seed)
-        robot = PlanarRobot(case.scene, floor, step, compiled, turning)
+        robot = PlanarRobot(case.scene, floor, step, compiled)
         pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / step)
         start = time.process_time()
         if at_once:
@@ -213,8 +212,7 @@ def towing_walkers() -> list[Walker]:
     """Return L1, L2 and Drake, with soles that resist turning and with those that do not."""
     fine = replace(RECOMMENDED, timestep=TOP_STEP)
     return [
-        *(_planar(family, SAMPLE, False, turns, False)
-          for family, turns in (('L1', False), ('L1, soles turn', True))),
+        _planar('L1', SAMPLE, False, False),
         _full('L2', fine),
         _full(f'L2, {FREE}', fine, turning=False),
         _drake('bristles', 2e-4),

@@ -284,10 +284,9 @@ def test_every_level_is_there_and_finer_ones_are_nearer(measured_walks):
     for step in ('1', '4', '10'):
         same = [
             found[f'{name}, {step} ms'].errors
-            for name in ('L1', 'L1, compiled', 'L1, compiled, walk', 'L1, soles turn')
+            for name in ('L1', 'L1, compiled', 'L1, compiled, walk')
         ]
         assert same[0] == same[1] == same[2]
-        assert same[3]['slip'] < same[0]['slip']
     half, two, planar, peer = (
         found[method] for method in ('L2, 0.5 ms', 'L2, 2 ms', 'L1, 4 ms', 'MuJoCo defaults, 2 ms')
     )
