@@ -48,6 +48,11 @@ class WalkingGait:
     middles: tuple[float, ...]
     pushes: bool
 
+    @property
+    def stance(self) -> float:
+        """Duration of a stance, s."""
+        return self.duty * self.cycle
+
     @cached_property
     def fewest(self) -> int:
         """Fewest legs that stand at once, at least 1."""

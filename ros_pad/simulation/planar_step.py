@@ -16,7 +16,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, exp, inf, pi, sin, sqrt
-from typing import Any, NamedTuple
+from typing import Any
+
+from ros_pad.simulation.planar_model import PlanarModel
 
 # A contact in a step: lever arm x, y, m; velocity x, y, m/s, and yaw rate, rad/s, at which the
 # contact would slide if the body stood still; turning radius, m; cap of its force, N; force over
@@ -24,7 +26,7 @@ from typing import Any, NamedTuple
 Pushed = tuple[float, float, float, float, float, float, float, float]
 
 # Rows of the table of feet; a column is a foot. Values are in world axes unless noted.
-FEET = 28
+FEET = 27
 (
     PHASE,  # time since touch-down, as a share of the cycle
     OFFSET_X, OFFSET_Y,  # from home, in the body, m
@@ -41,11 +43,11 @@ FEET = 28
     OVERLOAD,  # time with a load above the force limit of the domes, s
     WET,  # 1 on wet ground, 0 on dry
     MARKER_X, MARKER_Y,  # position of the marker, m
-    STEP_X, STEP_Y, STEP_TURN,  # motion of the foot in the body in this step, m and rad
+    STEP_X, STEP_Y,  # motion of the foot in the body in this step, m
 ) = range(FEET)  # fmt: skip
 
 # Entries of the body, in SI units.
-BODY = 17
+BODY = 16
 (
     STEPS, X, Y, HEADING, SPEED_X, SPEED_Y, YAW_RATE,
     PULL_X, PULL_Y,  # force of the towed load on the body, N
@@ -53,97 +55,7 @@ BODY = 17
     LOST,  # work lost in slip, J
     TIPPED, TIPPED_AT,  # foot that would have to pull, one more than feet: no balance; time, s
     PUSH_X, PUSH_Y,  # force of all feet, N
-    SLED_CAP,  # friction of the towed load, N
 ) = range(BODY)  # fmt: skip
-
-
-class PlanarGait(NamedTuple):
-    """The gait, and how it moves feet and soles."""
-
-    cycle: float
-    stride: float
-    duty: float
-    lift: float
-    reach: float
-    pushes: bool  # whether the body's speed is zero twice a cycle
-    overlap: float  # share of the cycle in which load passes from foot to foot
-    middle: tuple[float, ...]  # time of the middle of each leg's push, as a share of the cycle
-    heading_gain: float
-    soles_turn: bool
-
-
-class PlanarTrunk(NamedTuple):
-    """Body and legs."""
-
-    home_x: tuple[float, ...]
-    home_y: tuple[float, ...]
-    hip_x: tuple[float, ...]
-    hip_y: tuple[float, ...]
-    centre_x: float  # of mass, in the body, m
-    centre_y: float
-    mass: float
-    inertia: float
-    height: float
-    weight: float  # component of the weight normal to the floor, N
-    downhill: float  # acceleration along -x, m/s²
-    leg_stiffness: float
-    rocks: float  # m²: lets feet in a line carry the body; 0 if it must be in balance
-
-
-class PlanarTow(NamedTuple):
-    """The towed load."""
-
-    mass: float  # mass, kg
-    dry: float  # drag of the towed load on dry ground, N
-    wet: float  # drag of the towed load on wet ground, N
-    distance: float
-    height: float
-    stiffness: float
-
-
-class PlanarFoot(NamedTuple):
-    """Friction and film of a foot on the floor of the scene."""
-
-    friction: float
-    shear_strength: float
-    conforming_pressure: float
-    boundary_friction: float
-    capillary: float  # tangential force of the liquid around all domes, N
-    critical_film: float
-    film_exponent: float
-    shear_stiffness: float
-    turning_radius: float
-    sole_area: float
-    dome_drain: float
-    sole_drain: float
-    limit_cell: float
-    limits: Any  # sequence of force limits, N, every limit_cell from 0 Pa
-
-
-class PlanarFloor(NamedTuple):
-    """Maps of liquid and heights."""
-
-    puddle: float  # 1/h² of standing liquid, 1/m²
-    wet: Any  # [row along y][column along x], True where wet
-    wet_cell: float
-    wet_x: float
-    wet_y: float
-    heights: Any  # [row along y][column along x], m
-    height_cell: float
-    height_x: float
-    height_y: float
-
-
-class PlanarModel(NamedTuple):
-    """Constants of a walk in SI units, in tuples and sequences, because numba takes no objects."""
-
-    period: float
-    settle: float
-    gait: PlanarGait
-    trunk: PlanarTrunk
-    tow: PlanarTow
-    foot: PlanarFoot
-    floor: PlanarFloor
 
 
 def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -> bool:
@@ -167,7 +79,6 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
         behind_x = body[X] - model.tow.distance * cosine
         behind_y = body[Y] - model.tow.distance * sine
         cap = model.tow.wet if is_wet(model, behind_x, behind_y) else model.tow.dry
-    body[SLED_CAP] = cap
     stiffness = model.tow.stiffness
     if cap > 0.0:
         contacts.append((
@@ -193,7 +104,7 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
     body[X] += vx * dt
     body[Y] += vy * dt
     body[HEADING] += yaw_rate * dt
-    report(model, body, feet, pressures, contacts)
+    report(model, body, feet, contacts)
     return True
 
 
@@ -226,8 +137,8 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
     lifted_x, lifted_y = feet[LIFTED_X], feet[LIFTED_Y]
     heights, step_x, step_y = feet[HEIGHT], feet[STEP_X], feet[STEP_Y]
     share = time / cycle
-    for index in range(len(gait.middle)):
-        phase = (share - gait.middle[index] + duty / 2.0) % 1.0
+    for index in range(len(gait.middles)):
+        phase = (share - gait.middles[index] + duty / 2.0) % 1.0
         x, y = offset_x[index], offset_y[index]
         stood = phases[index] < duty
         phases[index] = phase
@@ -240,12 +151,6 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
             step_y[index] = -turn * (trunk.home_x[index] + x)
             offset_x[index] = x + step_x[index]
             offset_y[index] = y + step_y[index]
-            if gait.soles_turn:
-                # The sole turns with its leg, by the angle of the foot's motion seen from the hip.
-                arm_x = trunk.home_x[index] - trunk.hip_x[index] + x + 0.5 * step_x[index]
-                arm_y = trunk.home_y[index] - trunk.hip_y[index] + y + 0.5 * step_y[index]
-                across = arm_x * step_y[index] - arm_y * step_x[index]
-                feet[STEP_TURN][index] = across / (arm_x * arm_x + arm_y * arm_y)
         else:
             if stood:
                 lifted_x[index], lifted_y[index] = x, y
@@ -332,14 +237,14 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     phases, offset_x, offset_y, ground = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y], feet[GROUND]
     loads = feet[LOAD]
     legs = []
-    for index in range(len(model.gait.middle)):
+    for index in range(len(model.gait.middles)):
         loads[index] = 0.0
         share = load_share(duty, model.gait.overlap, phases[index])
         if share > 0.0:
             x = model.trunk.home_x[index] + offset_x[index]
             y = model.trunk.home_y[index] + offset_y[index]
             legs.append((index, share, x, y, model.trunk.leg_stiffness * ground[index]))
-    count = len(model.gait.middle)
+    count = len(model.gait.middles)
     sets = 1 << count
     presses = sets - 1  # set of feet that press, with a bit for each foot
     pulling = 0
@@ -434,7 +339,7 @@ def grip(
     dt = model.period
     stiffness, radius = model.foot.shear_stiffness, model.foot.turning_radius
     contacts = []
-    for index in range(len(model.gait.middle)):
+    for index in range(len(model.gait.middles)):
         load = feet[LOAD][index]
         if load <= 0.0:
             feet[CAP][index] = 0.0
@@ -460,7 +365,7 @@ def grip(
                 x, y,
                 (cosine * step_x - sine * step_y + feet[SHEAR_X][index]) / dt,
                 (sine * step_x + cosine * step_y + feet[SHEAR_Y][index]) / dt,
-                (feet[STEP_TURN][index] + feet[SHEAR_TURN][index]) / dt,
+                feet[SHEAR_TURN][index] / dt,
                 radius, cap, stiffness * dt,
             ))  # fmt: skip
     return contacts
@@ -665,9 +570,7 @@ def push(
     return -gain * zx, -gain * zy, -gain * radius * zt, loose * sqrt(along), loose * size * cap
 
 
-def report(
-    model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float], contacts: list[Pushed]
-) -> None:
+def report(model: PlanarModel, body: Any, feet: Any, contacts: list[Pushed]) -> None:
     """Set forces, shear, slip and markers of the feet, and add the work lost in slip."""
     dt = model.period
     stiffness, radius = model.foot.shear_stiffness, model.foot.turning_radius
@@ -676,7 +579,7 @@ def report(
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     total_x = total_y = 0.0
     place = 0
-    for index in range(len(model.gait.middle)):
+    for index in range(len(model.gait.middles)):
         fx = fy = moment = slid = 0.0
         if feet[CAP][index] > 0.0:
             fx, fy, moment, slid, lost = push(vx, vy, yaw_rate, contacts[place], dt)

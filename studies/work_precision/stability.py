@@ -23,9 +23,9 @@ from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
-from ros_pad.simulation.planar_robot import GRAVITY
 from ros_pad.simulation.pneumatics import (
     ATMOSPHERE,
     REFERENCE_DENSITY,

@@ -239,11 +239,8 @@ def test_every_level_is_there_and_finer_ones_are_nearer(measured_walks):
     assert found['L2, 2 ms'].versus == found['RailLeg, 4 ms'].versus == 1.0
     # The same walk runs in three ways.
     for step in ('1', '4', '10'):
-        same = [
-            found[f'{name}, {step} ms'].errors for name in ('L1', 'L1, compiled', 'L1, soles turn')
-        ]
+        same = [found[f'{name}, {step} ms'].errors for name in ('L1', 'L1, compiled')]
         assert same[0] == same[1]
-        assert same[2]['slip'] < same[0]['slip']
     half, two, planar, peer = (
         found[method] for method in ('L2, 0.5 ms', 'L2, 2 ms', 'L1, 4 ms', 'MuJoCo defaults, 2 ms')
     )
