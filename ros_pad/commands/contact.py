@@ -13,7 +13,6 @@ from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.configuration import number
 from ros_pad.contact.dome import ADHESION_SIGNS, MODELS
 from ros_pad.contact.limits import criteria, largest_pressure
-from ros_pad.contact.resistance import RUBBER_SETTINGS
 from ros_pad.contact.thickness import HIGHEST
 from ros_pad.errors import InvalidInput, NoEquilibrium
 
@@ -38,20 +37,11 @@ Shape of a pad at a pressure, free or pressed, and its force limits.
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'contact',
-        run,
-        'Shape of a pad at a pressure, free or pressed, and its force limits.',
-        'pad contact --pressure 75000 --force 0.1',
-    )
-    part.description = _DESCRIPTION
-    part.add_argument(
-        '--pressure', type=float, required=True, metavar='PA', help='gauge pressure in the pad, Pa'
-    )
-    part.add_argument(
-        '--force', type=float, default=0.0, metavar='N', help='load on the pad, N (default 0)'
-    )
+    example = 'pad contact --pressure 75000 --force 0.1'
+    part = add_command(commands, 'contact', run, _DESCRIPTION, example)
+    pressure: dict[str, Any] = {'type': float, 'metavar': 'PA', 'required': True}
+    part.add_argument('--pressure', help='gauge pressure in the pad, Pa', **pressure)
+    part.add_argument('--force', type=float, default=0.0, metavar='N', help='load on the pad, N')
     which = part.add_mutually_exclusive_group()
     which.add_argument(
         '--pad',
@@ -96,9 +86,7 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print shape, ring of liquid and force limits of the pad; return the exit status."""
-    pad, name = _pad(options)
-    _choose_law(pad, options)
-    liquid = contact.WATER if options.liquid == 'water' else contact.THESIS_LIQUID
+    pad = _pad(options)
     pressure, force = options.pressure, options.force
     values: dict[str, Any] = {
         'pad': options.material or options.foot or options.pad,
@@ -112,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
     }
     failure: NoEquilibrium | None = None
     try:
-        for part, shape in _shapes(pad, liquid, options):
+        for part, shape in _shapes(pad, options):
             values[part] = shape
     except NoEquilibrium as error:  # the results before the error are still printed
         failure = error
@@ -126,95 +114,63 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(values))
     else:
-        _show(f'{name}, {pressure:g} Pa gauge, {force:g} N', values, ends, pad.radius)
+        _show(values, ends)
     return 0 if failure is None else complain(f'{failure} (status {failure.status})', 1)
 
 
-def _pad(options: argparse.Namespace) -> tuple[contact.Pad, str]:
-    """Return the pad that the options name, and its name."""
-    pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
-    name = f'{options.pad} pad'
-    if options.foot is not None:
-        pad, name = contact.Foot.load(options.foot).pad, f'pad of {options.foot}'
+def _pad(options: argparse.Namespace) -> contact.Pad:
+    """Return the pad that the options name; set adhesion and model where they were not given."""
     if options.material is not None:
         material = contact.Material.load(options.material)
-        sizes = RUBBER_SETTINGS[0], RUBBER_SETTINGS[-1]
-        for each in sizes:
-            if getattr(options, each.name) is None:
-                raise InvalidInput(
-                    f'--{each.name} is missing: {each.allowed} is needed with --material'
-                )
-        radius, thickness = (
-            number(f'--{each.name}', getattr(options, each.name), each.unit, each.low, each.high)
-            for each in sizes
-        )
-        made = contact.Pad.of(material, radius, thickness, edge=options.edge)
-        return made, f'pad of {options.material}'
-    for key in ('radius', 'thickness', 'edge'):
-        if getattr(options, key) is not None:
-            raise InvalidInput(f'--{key} is not allowed without --material')
-    return pad, name
-
-
-def _choose_law(pad: contact.Pad, options: argparse.Namespace) -> None:
-    """Set the adhesion and model that were not given; refuse those that the pad does not have."""
+        radius = number('--radius', options.radius, 'm', 1e-4, 1e-2)
+        thickness = number('--thickness', options.thickness, 'm', 1e-5, 1e-2)
+        pad = contact.Pad.of(material, radius, thickness, edge=options.edge)
+    else:
+        for key in ('radius', 'thickness', 'edge'):
+            if getattr(options, key) is not None:
+                raise InvalidInput(f'--{key} is not allowed without --material')
+        pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
+        if options.foot is not None:
+            pad = contact.Foot.load(options.foot).pad
     cap = pad.material is None
-    for key, of_cap, of_rubber in (
-        ('adhesion', 'matlab', 'none'),
-        ('model', 'thesis', 'membrane'),
+    for key, own in (
+        ('adhesion', 'matlab' if cap else 'none'),
+        ('model', 'thesis' if cap else 'membrane'),
     ):
         if getattr(options, key) is None:
-            setattr(options, key, of_cap if cap else of_rubber)
+            setattr(options, key, own)
         elif not cap:
             raise InvalidInput(f'--{key} is not allowed for a pad of a material')
+    return pad
 
 
-def _shapes(
-    pad: contact.Pad, liquid: contact.Liquid, options: argparse.Namespace
-) -> Iterator[tuple[str, dict[str, Any]]]:
+def _shapes(pad: contact.Pad, options: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield name and values of the free dome, the pressed dome and its ring of liquid.
 
     Raises NoEquilibrium at the first of them that does not exist.
     """
+
+    def values(of: Any, *names: str) -> dict[str, Any]:
+        units = {'volume': '_m3', 'tangential_force': '_n', 'status': ''}
+        return {name + units.get(name, '_m'): getattr(of, name) for name in names}
+
     pressure, force = options.pressure, options.force
     free = contact.inflate(pad, pressure)
-    yield (
-        'free',
-        {
-            'height_m': free.height,
-            'sphere_radius_m': free.sphere_radius,
-            'volume_m3': free.volume,
-        },
-    )
+    yield 'free', values(free, 'height', 'sphere_radius', 'volume')
     pressed = contact.press(pad, pressure, force, options.adhesion, options.model)
-    yield (
-        'pressed',
-        {
-            'height_m': pressed.height,
-            'depth_m': pressed.depth,
-            'contact_radius_m': pressed.contact_radius,
-            'sphere_radius_m': pressed.sphere_radius,
-            'gap_m': pressed.gap,
-            'status': pressed.status,
-        },
-    )
+    names = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap', 'status')
+    yield 'pressed', values(pressed, *names)
     if not force > 0.0:  # the ring around a dome without load is too small to compute
         yield 'meniscus', {'status': 'no_contact'}
         return
-    wet = contact.meniscus(pressed, liquid)
-    yield (
-        'meniscus',
-        {
-            'height_m': wet.height,
-            'ring_radius_m': wet.ring_radius,
-            'tangential_force_n': wet.tangential_force,
-            'status': wet.status,
-        },
+    ring = contact.meniscus(
+        pressed, contact.WATER if options.liquid == 'water' else contact.THESIS_LIQUID
     )
+    yield 'meniscus', values(ring, 'height', 'ring_radius', 'tangential_force', 'status')
 
 
-def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radius: float) -> None:
-    print(heading)
+def _show(values: dict[str, Any], ends: dict[str, float]) -> None:
+    print(f'pad {values["pad"]}, {values["pressure_pa"]:g} Pa gauge, {values["force_n"]:g} N')
     for part, title in _TITLES.items():
         if part not in values:
             continue
@@ -227,7 +183,7 @@ def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radi
                 print(f'  {key:18} {value}')
             else:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
-        if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad_radius:
+        if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > values['radius_m']:
             print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')
     if not ends:
         print('  none is known for a pad with an edge: pressed, it has no model')

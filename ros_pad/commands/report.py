@@ -7,9 +7,9 @@ import argparse
 import os
 import pathlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ros_pad.commands.command import Commands, add_command
+from ros_pad.commands.command import FILE, FOLDER, Commands, add_command
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
 from ros_pad.configuration import refuse
@@ -35,9 +35,8 @@ def add(commands: Commands) -> None:
         'network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.',
         'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures',
     )
-    part.add_argument(
-        'path', metavar='PATH', nargs='?', type=pathlib.Path, help='folder of a bag or of a sweep'
-    )
+    path: dict[str, Any] = {'type': pathlib.Path, 'metavar': 'PATH', 'nargs': '?'}
+    part.add_argument('path', help='folder of a bag or of a sweep', **path)
     part.add_argument(
         '--thesis',
         action='store_true',
@@ -45,17 +44,12 @@ def add(commands: Commands) -> None:
     )
     part.add_argument(
         '--out',
-        type=pathlib.Path,
-        metavar='FILE',
+        **FILE,
         help='page to write (default: report.html beside the bag or in the folder of the sweep, '
         f'{THESIS} in this folder; no page with --figures)',
     )
-    part.add_argument(
-        '--figures',
-        type=pathlib.Path,
-        metavar='DIR',
-        help='write each figure into this folder as PDF and PNG; no page without --out',
-    )
+    text = 'write each figure into this folder as PDF and PNG; no page without --out'
+    part.add_argument('--figures', help=text, **FOLDER)
     part.add_argument('--force', action='store_true', help='replace existing files')
 
 
@@ -64,12 +58,16 @@ def run(options: argparse.Namespace) -> int:
     if options.thesis:
         if options.path is not None:
             raise InvalidInput(f'--thesis draws no bag or sweep: leave out {options.path}')
-        return _of_thesis(options)
+        words = ['--force'] if options.force else []
+        for name in ('out', 'figures'):
+            value = getattr(options, name)
+            words += [f'--{name}', str(value)] if value is not None else []
+        return run_study('thesis', *words)
     if options.path is None:
         raise InvalidInput('PATH (folder of a bag or sweep) or --thesis is needed')
     if not options.path.exists():
         raise BagError(f'{options.path}: no such bag or sweep')
-    from ros_pad.reports import report, sweep_page
+    from ros_pad.reports import report, sweep
 
     if sweeps.is_sweep(options.path):
         page = page_for(options, options.path / 'report.html')
@@ -77,30 +75,18 @@ def run(options: argparse.Namespace) -> int:
         return write_all(
             options,
             page,
-            lambda out: sweep_page.write(found, out, options.force),
-            lambda: sweep_page.draw(found),
+            lambda out: sweep.write(found, out, options.force),
+            lambda: {'sweep': sweep.drawn(found)},
         )
     page = page_for(options, pathlib.Path(os.path.normpath(options.path / '..' / 'report.html')))
     with bar('reading', 1.0, 'bag') as progress:
         trial = recorded.load(options.path, progress=progress)
-
-    def write(out: pathlib.Path) -> None:
-        with bar('report', 1.0, 'page') as progress:
-            report.write(trial, out, force=options.force, progress=progress)
-
-    def drawn() -> dict[str, Drawn]:
-        with bar('drawing', 1.0, 'trial') as progress:
-            return report.drawn(trial, progress=progress)
-
-    return write_all(options, page, write, drawn)
-
-
-def _of_thesis(options: argparse.Namespace) -> int:
-    words = ['--force'] if options.force else []
-    for name in ('out', 'figures'):
-        value = getattr(options, name)
-        words += [f'--{name}', str(value)] if value is not None else []
-    return run_study('thesis', *words)
+    return write_all(
+        options,
+        page,
+        lambda out: report.write(trial, out, force=options.force),
+        lambda: report.drawn(trial),
+    )
 
 
 def page_for(options: argparse.Namespace, default: pathlib.Path) -> pathlib.Path | None:
@@ -125,12 +111,11 @@ def write_all(
     from ros_pad.reports.files import write_figures
 
     if page is not None:
-        write(page)
+        with bar('report', 1.0, 'page'):
+            write(page)
         print(page)
     if options.figures is not None:
-        found = drawn()
-        with bar('figures', 1.0, 'folder') as progress:
-            paths = write_figures(found, options.figures, options.force, progress)
-        for path in paths:
-            print(path)
+        with bar('drawing', 1.0, 'folder'):
+            paths = write_figures(drawn(), options.figures, options.force)
+        print(*paths, sep='\n')
     return 0

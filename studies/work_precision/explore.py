@@ -18,14 +18,13 @@ import time
 import urllib.parse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ros_pad.contact import Foot
 from ros_pad.errors import PadError
-from ros_pad.reports.explore import FIELDS, Inputs
+from ros_pad.reports.explore import FIELDS, inputs_of
 from ros_pad.reports.explore_page import answer
 from ros_pad.reports.files import save
 from studies import command
@@ -122,16 +121,16 @@ def measure(page: Any, moves: int) -> dict[str, list[float]]:
 
 def computed(foot: str, moves: int) -> dict[str, list[float]]:
     """Return the processor times of the same answers without a page, ms, by slider."""
-    shipped = Inputs.of(Foot.load(foot))
+    shipped = inputs_of(Foot.load(foot))
     answer(shipped)
     found: dict[str, list[float]] = {}
     for field in FIELDS:
         inputs = shipped
         for _ in range(moves):
-            down = getattr(shipped, field.name) > 0.5 * (field.low + field.high) * field.unit
+            down = shipped[field.name] > 0.5 * (field.low + field.high) * field.unit
             step = -field.step if down else field.step
-            moved = getattr(inputs, field.name) + step * field.unit
-            inputs = replace(inputs, **{field.name: moved})
+            moved = inputs[field.name] + step * field.unit
+            inputs = inputs | {field.name: moved}
             start = time.process_time()
             answer(inputs)
             found.setdefault(field.name, []).append(1e3 * (time.process_time() - start))

@@ -108,7 +108,7 @@ def test_the_replayed_bag_is_a_bag_for_others(tmp_path: pathlib.Path):
         (['--set', 'tau=0.2'], "'tau' is unknown"),
         (['--set', 'policy.dwell=3', '--policy', 'dome'], 'only the adaptive'),
         (['--foot', 'wide'], 'large19'),
-        (['--remap', 'leg_1/wrench=/x'], 'NAME:=TOPIC'),
+        (['--remap', 'leg_1/wrench=/x'], 'NAME:=VALUE is needed'),
         (['--remap', 'leg_1/wrench:=/x'], 'no topic /x'),
         (['--remap', 'leg_1/wrench:=/x', '--remap', 'leg_1/wrench:=/y'], 'twice'),
         (['--namespace', 'spider'], 'no legs in namespace /spider/'),

@@ -62,7 +62,7 @@ def test_seeds_and_values_as_they_are_typed():
         ('x=1:2:2.5', 'START:STOP:COUNT'),
         ('x=1:two:2', 'START:STOP:COUNT'),
         ('x=1:inf:2', 'START:STOP:COUNT'),
-        ('x=1:2:1', 'COUNT from 2 to 100000'),
+        ('x=1:2:1', 'COUNT = 1 is not allowed: a whole number from 2 to 100000'),
         ('x=1:1:3', 'STOP other than START'),
     ],
 )

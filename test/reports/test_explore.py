@@ -11,17 +11,17 @@ import pytest
 
 from ros_pad import cli
 from ros_pad.contact import Film, Foot, MeasuredLimit, Pad, force_limit, tangential_resistance
-from ros_pad.reports.explore import FIELDS, STATES, Explored, Field, Inputs, explore, rows
+from ros_pad.reports.explore import FIELDS, STATES, Explored, Field, explore, inputs_of, rows
 from ros_pad.reports.explore_drawings import drawings, svg
 from ros_pad.reports.explore_page import foot_file
 from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel, Scene
 from ros_pad.simulation.pneumatics import time_to
 
-LARGE = Inputs.of(Foot.load('large37'))
+LARGE = inputs_of(Foot.load('large37'))
 
 
 def changed(**values: object) -> Explored:
-    return explore(dataclasses.replace(LARGE, **values))
+    return explore(LARGE | values)
 
 
 def picture(found: Explored) -> str:
@@ -29,11 +29,11 @@ def picture(found: Explored) -> str:
 
 
 def texts(found: Explored) -> dict[str, str]:
-    return {row.key: row.text for _, group in rows(found) for row in group}
+    return {key: text for group in rows(found).values() for key, (_, text) in group.items()}
 
 
 def test_the_numbers_are_those_of_pad_contact(capsys: pytest.CaptureFixture[str]):
-    force = str(LARGE.load / 37)
+    force = str(LARGE['load'] / 37)
     options = ('--foot', 'large37', '--pressure', '76500', '--force', force, '--json')
     assert cli.main(['contact', *options]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -69,23 +69,23 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
 
 def test_film_time_and_hose_are_those_of_the_scene():
     scene = Scene.load('hexapod_patches')
-    assert scene.floor.film_thickness == LARGE.film
-    assert scene.regulator == {'hose_diameter': LARGE.bore, 'hose_length': LARGE.hose}
-    assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE.stand
+    assert scene.floor.film_thickness == LARGE['film']
+    assert scene.regulator == {'hose_diameter': LARGE['bore'], 'hose_length': LARGE['hose']}
+    assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE['stand']
 
 
 def test_a_measured_limit_stays_with_its_pad():
     pad = Pad(1.6e-3, 45.0, measured_limit=MeasuredLimit(0.3, 70e3, 5e-6))
-    foot = dataclasses.replace(LARGE.foot, pad=pad, limit='measured')
-    own = explore(Inputs.of(foot))
-    assert own.limits['measured'] == force_limit(pad, own.inputs.pressure, 'measured')
+    foot = dataclasses.replace(LARGE['foot'], pad=pad, limit='measured')
+    own = explore(inputs_of(foot))
+    assert own.limits['measured'] == force_limit(pad, own.inputs['pressure'], 'measured')
     for other in ({'radius': 1.7e-3}, {'stiffness': 46.0}):
-        assert 'measured' not in explore(dataclasses.replace(own.inputs, **other)).limits
+        assert 'measured' not in explore(own.inputs | other).limits
 
 
 def test_switching_is_that_of_the_channel():
     found = changed(bore=1e-3, hose=5.0)
-    channel = PneumaticChannel(RegulatorModel(), Hose(1e-3, 5.0), LARGE.foot.air_volume)
+    channel = PneumaticChannel(RegulatorModel(), Hose(1e-3, 5.0), LARGE['foot'].air_volume)
     assert found.switching.fill == pytest.approx(
         time_to(channel, 76500.0, 0.9 * 76500.0), rel=0.01
     )
@@ -168,13 +168,13 @@ def test_the_values_of_every_slider_are_drawn(field: Field):
 @pytest.mark.parametrize('name', ['large37', 'large19', 'small217'])
 def test_the_foot_file_gives_the_foot(name: str, tmp_path: pathlib.Path):
     start = dataclasses.replace(Foot.load(name), capillary_force=1.5e-4)
-    inputs = dataclasses.replace(Inputs.of(start), pads=31, sole_radius=16e-3)
+    inputs = inputs_of(start) | {'pads': 31, 'sole_radius': 16e-3}
     path = tmp_path / 'foot.yaml'
     path.write_text(foot_file(explore(inputs).foot), encoding='utf-8')
     again = Foot.load(path)
     wanted = dataclasses.replace(start, source=str(path), pads=31, sole_radius=16e-3)
     assert again == wanted
-    other = dataclasses.replace(inputs, radius=0.7e-3, thickness=0.15e-3, criterion='flattening')
-    found = explore(other).foot
+    other = {'radius': 0.7e-3, 'thickness': 0.15e-3, 'criterion': 'flattening'}
+    found = explore(inputs | other).foot
     path.write_text(foot_file(found), encoding='utf-8')
     assert Foot.load(path) == dataclasses.replace(found, source=str(path))

@@ -145,11 +145,6 @@ def test_nothing_is_loaded_from_elsewhere(page):
     assert any(each.startswith('ws') for each in page.asked)
 
 
-def test_a_narrow_page_is_not_wider_than_its_window(page):
-    page.set_viewport_size({'width': 390, 'height': 844})
-    assert page.evaluate('document.documentElement.scrollWidth') <= 390
-
-
 def test_other_names_and_pages_are_refused_and_ctrl_c_ends_it():
     with study.served() as (address, child):
         with urllib.request.urlopen(address) as answer:
