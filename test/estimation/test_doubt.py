@@ -66,12 +66,12 @@ def kind(estimate):
 # --- the ground ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('ratio', [0.0, 0.02, 0.05, 0.08])
+@pytest.mark.parametrize('ratio', [0.0, 0.08])
 def test_a_foot_that_is_never_pulled_stays_with_its_prior(ratio):
     """The foot would stick on wet and on dry ground, so that the ground is unobservable."""
-    for prior in (0.1, 0.5, 0.9):
+    for prior in (0.1, 0.5):
         walk = Walk(wet_prior=prior)
-        for _ in range(20):
+        for _ in range(12):
             estimate = walk.stand(ratio)
             assert kind(estimate) == 'not pulled'
             walk.swing()
@@ -134,25 +134,7 @@ def test_half_inflated_is_reported():
     assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_light_foot_measures_little():
-    walk = Walk()
-    estimate = walk.stand(0.5, load=0.15 * LOAD)
-    assert kind(estimate) in ('', 'light')
-    lighter = Walk(force_noise=0.3).stand(0.3, load=0.15 * LOAD)
-    assert kind(lighter) == 'light'
-    assert 0.1 < lighter.wet_probability < 0.9
-
-
-def test_friction_between_wet_and_dry_is_undecided():
-    """The foot slips at T/N = 0.33; wet ground is expected to give 0.12 and dry ground 0.8."""
-    walk = Walk()
-    estimate = walk.stand(0.33, 0.12)
-    assert kind(estimate) in ('undecided', '')
-    assert 0.05 < estimate.wet_probability < 0.95
-    assert estimate.friction_mean == pytest.approx(0.33, abs=2.0 * estimate.friction_sd)
-
-
-@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('seed', range(2))
 def test_what_turning_hides_a_moment_shows(seed):
     """A slip at T/N = 0.12 is on wet ground, or on dry ground where the foot also turns.
 
@@ -170,12 +152,6 @@ def test_what_turning_hides_a_moment_shows(seed):
     assert wet.wet_probability > 0.95
     assert wet.friction_mean == pytest.approx(shown, abs=2.0 * wet.friction_sd)
     assert wet.friction_sd < unknown.friction_sd
-
-
-def test_a_foot_that_only_turns_a_little_reports_it():
-    estimate = Walk(moment_noise=5e-4).stand(0.02, moment=0.1 * LOAD * LEVER)
-    assert kind(estimate) == 'turning'
-    assert 0.3 < estimate.wet_probability < 0.7
 
 
 def test_doubts_are_where_the_errors_are():
@@ -202,33 +178,12 @@ def test_doubts_are_where_the_errors_are():
     assert np.mean(every > 0.5) == pytest.approx(np.mean(np.maximum(every, 1.0 - every)), abs=0.06)
 
 
-def test_faults_of_sensors_are_distinguished_from_unobservable_ground():
-    assert doubt.is_fault(doubt.STILL) and 'force stands still' in SENSOR_FAULTS
-    assert not doubt.is_fault(doubt.ALL_DOME) and not doubt.is_fault(doubt.NONE)
-    assert not {'', 'domed', 'motion unknown'} & {*SENSOR_FAULTS}
-
-
 @pytest.mark.parametrize('code', range(len(doubt.TABLE)))
 def test_every_code_has_a_text_that_begins_with_its_kind(code):
     text = doubt.text(code, 1.0, -2.0)
     assert text.partition(':')[0] == doubt.kind(code)
     assert doubt.kind(code) in DOUBTS
     assert (doubt.kind(code) in SENSOR_FAULTS) == doubt.is_fault(code)
-
-
-@pytest.mark.parametrize(
-    ('given', 'text'),
-    [
-        ((doubt.NONE,), ''),
-        ((doubt.LOST, 0.2), 'marker lost: last seen 0.2 s ago'),
-        ((doubt.RANGE, 2, -5.0), 'force out of range: z = -5 N'),
-        ((doubt.NORMAL, 0, -4.0), 'axes: the normal force is along -x of the sensor, not z'),
-        ((doubt.TURNED, 1), 'axes: force axes turned by about 90° about z'),
-        ((doubt.FAINT, 1.23, 6.8), 'light: 1.2 N of 6.8 N'),
-    ],
-)
-def test_texts_of_codes(given, text):
-    assert doubt.text(*given) == text
 
 
 # --- the sensors --------------------------------------------------------------------------------
@@ -358,17 +313,6 @@ def test_a_sensor_that_dies_is_noticed_in_the_air_too():
     assert walk.estimate.doubt.startswith('force stands still')
 
 
-def test_a_sensor_found_dead_on_the_ground_does_not_come_to_life_in_the_air():
-    walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
-    walk.stand(0.6)
-    walk.swing()
-    walk.broken = True
-    assert kind(walk.stand(0.6)) == 'force stands still'
-    assert not any(walk.swing(seconds=seconds).sound for seconds in (0.1, 0.2, 0.4))
-    walk.broken = False
-    assert walk.swing().sound
-
-
 def test_simulated_feet_may_read_nothing_in_the_air():
     walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
     for _ in range(4):
@@ -383,31 +327,6 @@ def test_sensors_configured_without_noise_may_repeat_themselves():
     for k in range(1000):
         estimate = estimator.update(PERIOD * k, (-2.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0)
     assert estimate.sound
-
-
-def test_converters_with_steps_and_slow_markers_are_accepted():
-    """The force has steps of 0.1 N and noise of 0.03 N at 250 Hz; positions come at 31 Hz."""
-    walk = Broken(None)
-    walk.broken = True
-    update = FootEstimator.update
-    kept = [0.0, 0.0, 0.0]
-
-    def changed(time, force, position, *rest):
-        nonlocal kept
-        if round(time / PERIOD) % 8 == 0:
-            kept = position
-        stepped = [0.1 * round(each / 0.1) for each in force]
-        return update(walk.estimator, time, stepped, kept, *rest)
-
-    walk.estimator.update = changed
-    sound = True
-    for _ in range(10):
-        for k in range(125):
-            sound &= walk.sample(0.3 * math.sin(0.025 * k)).sound
-        for k in range(100):
-            walk.x += 0.0014
-            sound &= walk.sample(0.0, load=0.0, height=0.03 * math.sin(0.0314 * k)).sound
-    assert sound
 
 
 def test_an_old_position_shows_no_slip():
@@ -464,7 +383,7 @@ def test_a_clock_that_is_set_back_begins_a_new_stance():
     assert estimate.wet_probability == pytest.approx(known.wet_probability, abs=0.1)
 
 
-@pytest.mark.parametrize('bias', [0.5, 1.0, 3.0])
+@pytest.mark.parametrize('bias', [0.5, 3.0])
 def test_a_bias_too_large_to_be_none_is_found_in_the_first_swing(bias):
     """In the air the sensor reads nearly half of the load, but a rising foot does not stand."""
     walk = Broken(lambda force, position, *_: ([force[0], force[1], force[2] + bias], position))
@@ -475,12 +394,3 @@ def test_a_bias_too_large_to_be_none_is_found_in_the_first_swing(bias):
     assert not any(in_the_air)
     assert estimate.wet_probability > 0.9
     assert estimate.friction_mean == pytest.approx(0.12, abs=0.04)
-
-
-def test_an_offset_that_is_not_estimated_yet_adds_uncertainty():
-    first = Walk().stand(0.45, 0.1)
-    walk = Walk()
-    for _ in range(5):
-        walk.stand(0.0)
-        walk.swing()
-    assert walk.stand(0.45, 0.1).friction_sd < first.friction_sd

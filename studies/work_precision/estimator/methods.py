@@ -120,7 +120,7 @@ class SpeedCusum(SpeedThreshold):
             self._alarm.reset()
             return False
         speed, dt = found
-        return self._alarm.update([(speed, self._noise, dt)])
+        return self._alarm.update(speed, self._noise, dt)
 
 
 class BayesMargin:
