@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from ros_pad.configuration import instance, integer, number, shown
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation.axes import SharedAxes
 from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.ground import LONGEST_GAP, Ground, shared_friction
 from ros_pad.estimation.track import Sample, Track
@@ -56,11 +55,11 @@ class FeetEstimator:
         instance('tuning', tuning, Tuning)
         integer('count', count, 1)
         load = number('expected_load', expected_load, 'N', above=True)
-        self.shared, axes = shared_friction(foot, load, tuning), SharedAxes()
+        self.shared = shared_friction(foot, load, tuning)
         model = GroundModel(
             self.shared, tuning.wet_prior, tuning.patch_length, rim_speed=tuning.rim_speed(foot)
         )
-        self.tracks = [Track(Ground(foot, load, tuning, model), axes) for _ in range(count)]
+        self.tracks = [Track(Ground(foot, load, tuning, model)) for _ in range(count)]
 
     def update(
         self, time: float, samples: Sequence[Sample | None], pressures: Sequence[float]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.axes import BLOCK, Axes, SharedAxes
+from ros_pad.estimation.axes import BLOCK, Axes
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.ground import LONGEST_GAP, Ground
 from ros_pad.estimation.noise import SensorNoise
@@ -233,8 +233,6 @@ class Track:
     ----------
     ground : Ground
         What the foot knows of the ground.
-    shared : SharedAxes
-        What all feet show of their axes.
 
     Attributes
     ----------
@@ -257,7 +255,7 @@ class Track:
         Slip of its contact.
     """
 
-    def __init__(self, ground: Ground, shared: SharedAxes) -> None:
+    def __init__(self, ground: Ground) -> None:
         load, tuning = ground.expected_load, ground.tuning
         self._joints = tuning.source == 'joints'
         # An estimated position never stops, and its noise is not that of a marker.
@@ -265,7 +263,7 @@ class Track:
         self._faults = SensorFaults(tuning.force_noise, marker, tuning.force_range or math.inf)
         self.ground, self.slip = ground, Slip(ground.foot, tuning)
         memory = BODY_CORRELATION if self._joints else BLOCK
-        axes = Axes(load, self.slip.softness, memory, shared)
+        axes = Axes(load, self.slip.softness, memory)
         self.watch = Watch(SensorNoise(marker, tuning.force_noise, load), axes)
         self._offset, self._heights = Offset(load), Heights()
         self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m

@@ -92,7 +92,7 @@ class Watch:
         if duration > BLOCK + LONGEST_GAP or speed_sd == math.inf:
             self.axes.restart()
             return False
-        loaded = self.axes.update(time, duration, height, force)
+        loaded = self.axes.update(duration, height, force)
         measured, count = False, len(block) - earlier
         if self.looks and count:
             columns = [*zip(*block, strict=True)]
