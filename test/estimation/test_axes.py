@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import SENSOR_FAULTS, FootEstimator, doubt
-from ros_pad.estimation.axes import TURNS, Axes
+from ros_pad.estimation import SENSOR_FAULTS, FootEstimator
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -133,17 +132,6 @@ def test_what_was_learnt_is_forgotten_when_axes_turn():
     assert estimate.friction_mean == pytest.approx(new.friction_mean, rel=1e-3)
 
 
-def test_a_swing_counts_once_however_long_the_foot_stands_after_it():
-    axes, doubts = Axes(LOAD, 1.0 / FOOT.shear_stiffness), []
-    for _ in range(3):  # stand for 3.2 s, swing 20 mm below
-        for height, load, blocks in ((0.0, LOAD, 80), (-0.02, 0.0, 5)):
-            for _ in range(blocks):
-                axes.update(0.04, height, (0.0, 0.0, load))
-        doubts.append(doubt.text(*axes.doubt))
-    assert doubts[:2] == ['', '']
-    assert 'z of the position is turned' in doubts[2]
-
-
 def test_the_doubt_ends_when_the_axes_are_mended():
     walk = Walk(turn(90))
     for heading in HEADINGS:
@@ -157,10 +145,3 @@ def test_the_doubt_ends_when_the_axes_are_mended():
     assert 0.01 < estimate.friction_mean < 2.0 and 0.0 < estimate.wet_probability < 1.0
     scales = walk.estimator.ground.shared.scales
     assert all(math.isfinite(each.scale + each.sd) for each in scales.values())
-
-
-def test_turns_are_those_of_their_names():
-    """Force along x, read in turned axes: by 90° it appears along y."""
-    along = {name: (a, c) for name, (a, _, c, _) in zip(doubt.TURNS, TURNS, strict=True)}
-    assert along['force axes turned by about 90° about z'] == (0.0, 1.0)
-    assert along['left-handed, x of force or position has the wrong sign'] == (-1.0, 0.0)

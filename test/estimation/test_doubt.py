@@ -116,16 +116,6 @@ def test_a_dome_cannot_distinguish_the_grounds_and_reports_it(wet):
     assert walk.estimate.friction_mean == pytest.approx(PRIOR.dome, abs=0.1)
 
 
-def test_a_pad_that_fills_under_load_is_no_longer_taken_for_flat():
-    """A flat foot that sticks at 0.38 would be evidence of dry ground; a dome is not."""
-    walk = Walk()
-    walk.stand(0.05, pressure=0.0)
-    for k in range(250):
-        estimate = walk.sample(min(0.38, 0.01 * k), pressure=80e3 * min(1.0, k / 20))
-    assert kind(estimate) == 'domed'
-    assert estimate.wet_probability == pytest.approx(0.5, abs=0.1)
-
-
 def test_half_inflated_is_reported():
     walk = Walk()
     pressure = next(p for p in range(50_000, 90_000, 100) if FOOT.dome_load(LOAD, p) > 0.4 * LOAD)
@@ -158,7 +148,7 @@ def test_doubts_are_where_the_errors_are():
     """In stances drawn from the prior, estimates without doubt are right, others near chance."""
     random = np.random.default_rng(11)
     knowing, doubting = [], []
-    for seed in range(250):
+    for seed in range(150):
         wet = random.random() < 0.5
         mean = PRIOR.flat_wet if wet else PRIOR.flat_dry
         # Places differ by 0.14 (root mean square of the spreads), scales by the given deviation.
@@ -169,8 +159,8 @@ def test_doubts_are_where_the_errors_are():
         estimate = walk.stand(min(demand, friction), random.gamma(2.0, 0.04) if slips else 0.0)
         likely = estimate.wet_probability if wet else 1.0 - estimate.wet_probability
         (doubting if estimate.doubt else knowing).append(likely)
-    assert len(knowing) > 60
-    assert len(doubting) > 60
+    assert len(knowing) > 35
+    assert len(doubting) > 35
     assert np.mean(np.array(knowing) > 0.5) > 0.97
     assert np.mean(doubting) < 0.65
     # Probabilities are calibrated.
@@ -268,23 +258,6 @@ def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
     assert estimate.wet_probability < 0.3
 
 
-def test_a_marker_that_freezes_fades_belief_at_the_pace_of_the_walk():
-    walk = Broken(frozen_marker)
-    for _ in range(12):  # the estimator learns the pace: 0.14 m in 0.9 s
-        walk.stand(0.6)
-        walk.swing()
-    known = walk.stand(0.6)
-    walk.broken = True
-    started = walk.time
-    for _ in range(10):
-        walk.swing()
-        walk.stand(0.12, 0.05)
-    assert kind(walk.estimate) == 'marker stands still'
-    way = 0.14 / 0.9 * (walk.time - started)
-    faded = 0.5 + (known.wet_probability - 0.5) * math.exp(-way / 1.5)
-    assert walk.estimate.wet_probability == pytest.approx(faded, abs=0.06)
-
-
 @pytest.mark.parametrize('range_known', [True, False])
 def test_a_sensor_at_the_end_of_its_range_is_not_used(range_known):
     """If the sensor ends at 5 N under a load of 6.8 N, T/N = 0.6 looks like 0.82."""
@@ -311,15 +284,6 @@ def test_a_sensor_that_dies_is_noticed_in_the_air_too():
         walk.swing()
         walk.stand()
     assert walk.estimate.doubt.startswith('force stands still')
-
-
-def test_simulated_feet_may_read_nothing_in_the_air():
-    walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
-    for _ in range(4):
-        walk.broken = False
-        walk.stand(0.6)
-        walk.broken = True
-        assert walk.swing(seconds=1.5).sound
 
 
 def test_sensors_configured_without_noise_may_repeat_themselves():
@@ -353,22 +317,6 @@ def test_a_marker_that_leaps_is_no_slip_and_no_way():
     back = walk.stand(0.3, seconds=0.1)
     assert not (away.slipping or back.slipping)
     assert back.wet_probability == pytest.approx(known.wet_probability, abs=0.03)
-
-
-@pytest.mark.parametrize('every', [8, 4])
-def test_a_slow_marker_does_not_leap(every):
-    """Between samples at 31 and 62 Hz a foot that slides at 0.8 m/s moves by 26 and 13 mm."""
-    walk = Walk()
-    estimator, seen = walk.estimator, None
-    for k in range(150):
-        time, x = k * PERIOD, 0.8 * max(0.0, k - 50) * PERIOD
-        if k % every == 0:
-            marker = np.array([x, 0.0, 0.0]) + 1.5e-4 * walk.random.normal(size=3)
-            seen = (time, marker.tolist())
-        force = np.array([-0.4 * LOAD, 0.0, LOAD]) + 0.03 * walk.random.normal(size=3)
-        estimate = estimator.update(time, force.tolist(), seen[1], 0.0, position_time=seen[0])
-        assert estimate.sound
-    assert estimate.slipping
 
 
 def test_a_clock_that_is_set_back_begins_a_new_stance():
