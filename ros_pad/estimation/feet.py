@@ -1,30 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimator of all feet of a robot: slip, wetness, friction, and friction margin.
-
-Each foot follows a whole block of samples before the next one does: as long as it stands, or
-swings, and its readings are ordinary, little is to be done for a sample.
-"""
+"""Estimator of all feet of a robot: slip, wetness, friction, and friction margin."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from operator import sub
-
-import numpy as np
 
 from ros_pad.configuration import instance, integer, number, shown
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation.axes import SharedAxes
 from ros_pad.estimation.friction import GroundModel
-from ros_pad.estimation.ground import Ground, shared_friction
-from ros_pad.estimation.scales import DELAY
-from ros_pad.estimation.sensing import LEAP_DISTANCE, READINGS
+from ros_pad.estimation.ground import LONGEST_GAP, Ground, shared_friction
 from ros_pad.estimation.track import Sample, Track
 from ros_pad.estimation.tuning import Tuning
-from ros_pad.estimation.watch import LONGEST_GAP
-from ros_pad.records import Array
 
 
 class FeetEstimator:
@@ -67,76 +55,31 @@ class FeetEstimator:
         instance('tuning', tuning, Tuning)
         integer('count', count, 1)
         load = number('expected_load', expected_load, 'N', above=True)
-        self.shared, axes = shared_friction(foot, load, tuning), SharedAxes()
+        self.shared = shared_friction(foot, load, tuning)
         model = GroundModel(
             self.shared, tuning.wet_prior, tuning.patch_length, rim_speed=tuning.rim_speed(foot)
         )
-        self.tracks = [Track(Ground(foot, load, tuning, model), axes) for _ in range(count)]
-
-    def quiet(self, times: Sequence[float], values: Array) -> list[list[bool]] | None:
-        """Find the samples of each foot in which all readings change, and none of them leaps.
-
-        Parameters
-        ----------
-        times : sequence of float
-            Times, s, that advance.
-        values : array (samples, feet, numbers)
-            Complete samples, N, m and m/s.
-
-        Returns
-        -------
-        list of list of bool, or None
-            Whether they are such; None if this is unknown, because samples are missing.
-        """
-        gaps = map(sub, times, (min(each.time for each in self.tracks), *times))
-        if max(gaps) > LONGEST_GAP:
-            return None
-        readings = values[:, :, READINGS]
-        last = np.array([[each.sensing.last for each in self.tracks]])
-        moves = np.abs(readings - np.concatenate((last, readings[:-1])))
-        # Forces leap as they like.
-        quiet = ((moves > 0.0) & (moves <= FARTHEST)).all(axis=2)
-        found: list[list[bool]] = quiet.T.tolist()
-        return found
+        self.tracks = [Track(Ground(foot, load, tuning, model)) for _ in range(count)]
 
     def update(
-        self,
-        times: Sequence[float],
-        samples: Sequence[Sequence[Sample | None]],
-        pressures: Sequence[float],
-        quiet: Sequence[Sequence[bool]] | None = None,
+        self, time: float, samples: Sequence[Sample | None], pressures: Sequence[float]
     ) -> None:
-        """Process the samples of some times; a clock may have been set back in between.
+        """Process the samples of a time; the clock may have been set back.
 
         Parameters
         ----------
-        times : sequence of float
-            Times, s.
-        samples : sequence of sequence of Sample or None
-            For each foot a sample at each time, None where it has none.
+        time : float
+            Time, s.
+        samples : sequence of Sample or None
+            A sample of each foot, None where it has none.
         pressures : sequence of float
             Gauge pressure in the pads of each foot, Pa.
-        quiet : sequence of sequence of bool or None
-            For each foot the samples in which nothing but landing and lifting can happen, see
-            :meth:`quiet`; None: unknown.
         """
-        for track in self.tracks:
+        for track, sample, pressure in zip(self.tracks, samples, pressures, strict=True):
             track.fresh = False
-        first, count = 0, len(times)
-        while first < count:
-            end = first + 1
-            # In a shorter time feet cannot hear of each other.
-            while end < count and abs(times[end] - times[first]) < 0.9 * DELAY:
-                end += 1
-            part = slice(first, end)
-            for place, track in enumerate(self.tracks):
-                calm = quiet[place][part] if quiet else None
-                track.update(times[part], samples[place][part], pressures[place], calm)
-            first = end
+            if sample:
+                track.update(time, sample, pressure)
 
-
-FARTHEST = np.array(3 * [math.inf] + 3 * [0.5 * LEAP_DISTANCE])
-"""Largest changes of force and position in samples in which nothing leaps."""
 
 LARGEST_FORCE, LARGEST_POSITION, LARGEST_PRESSURE = 1e5, 1e6, 1e7
 """Largest size of a force, N, and moment, N m, of a position, m, and of a gauge pressure, Pa."""

@@ -107,8 +107,8 @@ class FootEstimator:
     :mod:`ros_pad.estimation.noise`); with joints only that of the force.
 
     The reading of the force sensor in the air is its offset, and is subtracted. No sample is used
-    while sensors are faulty (see :mod:`ros_pad.estimation.sensing`): the posterior is set back to
-    the one before the fault, and fades to the prior with distance.
+    while sensors are faulty (see :mod:`ros_pad.estimation.sensor_faults`): the posterior is set
+    back to the one before the fault, and fades to the prior with distance.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ class FootEstimator:
             ) from error
         refuse(time, track.time, wrong)
         track.fresh = False
-        track.update((time,), (sample,), pressure, None)
+        track.update(time, sample, pressure)
         self.estimate = self._estimate()
         return self.estimate
 
@@ -263,7 +263,7 @@ class FootEstimator:
         track = self.feet.tracks[self._place]
         now, ground = track.standing, track.ground
         return Estimate(
-            track.time, track.gate.stands, now.slipping, now.slip_velocity, now.slip_speed,
+            track.time, track.stands, now.slipping, now.slip_velocity, now.slip_speed,
             track.slip.sd, *ground.belief, track.margin, track.fresh, doubt.text(*ground.doubt),
             track.sound,
         )  # fmt: skip

@@ -4,22 +4,156 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from ros_pad.contact.resistance import THICK_FILM, Foot
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
-from ros_pad.estimation.parts import History, Path, Stance, Window
+from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel, Posterior
 from ros_pad.estimation.scales import FrictionPrior, FrictionScales
-from ros_pad.estimation.sensing import DEAD
+from ros_pad.estimation.sensor_faults import DEAD
 from ros_pad.estimation.tuning import Tuning
-from ros_pad.estimation.watch import LONGEST_GAP
 
-HINDSIGHT = DEAD + LONGEST_GAP
-"""Time for which earlier posteriors are kept, s: no sensor fault stays undetected for longer."""
+if TYPE_CHECKING:
+    from ros_pad.estimation.track import Window
 
 MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
+
+
+LONGEST_GAP = 0.15
+"""Longest gap between samples of one stance, s: in a longer gap the foot may have stepped."""
+
+NEW_PLACE = 5e-4
+"""Distance over which a sliding foot meets new ground, m."""
+
+LONGEST_STEP = 5.0
+"""Longest time between touch-downs of a walking foot, s: after a longer time its speed is unknown.
+"""
+
+FADING_STEP = 0.02
+"""Least distance by which the posterior fades without measurements, m: more than the jitter of a
+marker.
+"""
+
+
+class Stance:
+    """Evidence of one stance.
+
+    Attributes
+    ----------
+    dome_share : float
+        Share of the expected load that domes carry, 0 to 1.
+    peak_ratio, peak_turning : float
+        Largest T/N of the pull, and of the friction used by turning, each
+        as the mean of a window.
+    counted : tuple of float or None
+        T/N and place, m, of what earlier windows have shown; None to give the next full weight.
+    """
+
+    def __init__(self, dome_share: float = 0.0) -> None:
+        self.dome_share = dome_share
+        self.peak_ratio = self.peak_turning = 0.0
+        self.counted: tuple[float, float, float] | None = None
+
+    def weight(self, ratio: float, noise: float, x: float, y: float) -> float:
+        """Return the share of a window that is new evidence, 0 to 1.
+
+        A foot at the same place under the same pull repeats its measurement. So the weight grows
+        with the change of T/N (relative to its noise) and of the place, m, since earlier windows.
+        """
+        if self.counted is None:
+            self.counted = ratio, x, y
+            return 1.0
+        old_ratio, old_x, old_y = self.counted
+        pull, dx, dy = ratio - old_ratio, x - old_x, y - old_y
+        change = (pull / noise) ** 2 + (dx * dx + dy * dy) / NEW_PLACE**2
+        weight = -math.expm1(-0.5 * change)
+        self.counted = old_ratio + weight * pull, old_x + weight * dx, old_y + weight * dy
+        return weight
+
+
+class Path:
+    """Distances that a foot moves between its stances, with which the posterior fades."""
+
+    def __init__(self) -> None:
+        self._footprint: tuple[float, float] | None = None
+        self._touch_down = -math.inf  # time of the last touch-down, s
+        self._speed = 0.0  # mean speed of the foot's steps, m/s
+        self._unseen = 0.0  # distance moved without a marker, not yet returned for fading, m
+
+    def restart(self) -> None:
+        """Discard the time of the last touch-down, because the clock has been set back."""
+        self._touch_down = -math.inf
+
+    def touch_down(self, time: float, x: float, y: float) -> float:
+        """Process a touch-down at a time, s, and place, m; return the distance to fade by, m.
+
+        This is the distance from the last known place, 0 if there is none.
+        """
+        distance = math.dist(self._footprint or (x, y), (x, y))
+        if self._footprint and time - self._touch_down < LONGEST_STEP:
+            self._speed += 0.3 * (distance / (time - self._touch_down) - self._speed)
+        self._footprint, self._touch_down = (x, y), time
+        return distance
+
+    def seen(self, x: float, y: float) -> float:
+        """Process a position, m, without usable force; return the distance to fade by, m."""
+        distance = math.dist(self._footprint, (x, y)) if self._footprint else 0.0
+        if distance > FADING_STEP or self._footprint is None:
+            self._footprint = (x, y)
+        return distance if distance > FADING_STEP else 0.0
+
+    def unseen(self, dt: float) -> float:
+        """Process dt seconds without a usable position; return the distance to fade by, m.
+
+        The foot is assumed to continue at its mean speed.
+        """
+        self._unseen += 0.0 if math.isinf(dt) else self._speed * dt
+        distance, self._footprint = self._unseen, None
+        if distance <= FADING_STEP:
+            return 0.0
+        self._unseen = 0.0
+        return distance
+
+
+class History:
+    """Recent posteriors, kept because a sensor fault is detected only after some time.
+
+    Parameters
+    ----------
+    duration : float
+        Time for which posteriors are kept, s.
+    """
+
+    def __init__(self, duration: float) -> None:
+        self._duration = duration
+        self._entries: deque[tuple[float, Posterior]] = deque()
+
+    def add(self, time: float, posterior: Posterior) -> None:
+        """Add the posterior of a time, s."""
+        entries = self._entries
+        entries.append((time, posterior))
+        while len(entries) > 1 and entries[1][0] <= time - self._duration:
+            entries.popleft()
+
+    def clear(self) -> None:
+        """Discard all posteriors."""
+        self._entries.clear()
+
+    def undo(self, since: float) -> Posterior | None:
+        """Return the last posterior up to a time, s, or the first one if all are later.
+
+        Return None if no posterior is later. Discard all posteriors.
+        """
+        before = [posterior for at, posterior in self._entries if at <= since]
+        found = None
+        if len(before) < len(self._entries):
+            found = (before or [self._entries[0][1]])[-1]
+        self._entries.clear()
+        return found
 
 
 class Ground:
@@ -55,7 +189,7 @@ class Ground:
     ) -> None:
         self.foot, self.expected_load, self.tuning = foot, expected_load, tuning
         self.filter = GroundFilter(model)
-        self._path, self._history, self._stance = Path(), History(HINDSIGHT), Stance()
+        self._path, self._history, self._stance = Path(), History(DEAD + LONGEST_GAP), Stance()
         self.belief = (tuning.wet_prior, *self.filter.friction)
         self.quantile = self.filter.quantile(MARGIN_SHARE)
         self.doubt = Doubt(doubt.NOT_YET)
@@ -101,7 +235,7 @@ class Ground:
         self,
         time: float,
         window: Window,
-        place: tuple[float, float],
+        place: Sequence[float],
         pressure: float,
         noises: tuple[float, float, float],
         turning_known: bool,
@@ -151,7 +285,7 @@ class Ground:
         self,
         duration: float,
         window: Window,
-        place: tuple[float, float],
+        place: Sequence[float],
         noises: tuple[float, float, float],
         turning_known: bool,
     ) -> Evidence:

@@ -235,7 +235,6 @@ class ControllerNode(Node):
                 'shape': morphology,
                 'time to fill (s)': f'{monitor.fill_time:.2f}',
                 'time to vent (s)': f'{monitor.vent_time:.2f}',
-                'steps decided ahead': controller.lead(leg),
                 'touch-downs with too little pressure': controller.underpressure[leg],
                 'flat feet pay': controller.friction.flat_pays,
             }

@@ -310,7 +310,7 @@ def cusum(recording: Recording, speed: np.ndarray) -> np.ndarray:
     for start, stop in recording.stances:
         alarm.reset()
         for index in range(start, stop):
-            alarm.update([(float(speed[index]), noise, recording.period)])
+            alarm.update(float(speed[index]), noise, recording.period)
             (statistic[index],) = alarm.statistics
     return statistic
 

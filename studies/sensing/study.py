@@ -74,7 +74,7 @@ def alarms_of(track: Track, rate: float) -> Flags:
             alarm.reset()
             for row in range(start + round(SETTLED * rate), stop):
                 sample = float(speeds[row, leg]), ALARM_NOISE, 1.0 / rate
-                found[row, leg] = alarm.update([sample])
+                found[row, leg] = alarm.update(*sample)
     return found
 
 

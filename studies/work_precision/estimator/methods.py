@@ -113,7 +113,8 @@ def cusum_alarm(settings: Settings, speed: float, threshold: float) -> Update:
         if found is None:
             alarm.reset()
             return False
-        return alarm.update([(found[0], noise, found[1])])
+        speed, dt = found
+        return alarm.update(speed, noise, dt)
 
     return update
 
