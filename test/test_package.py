@@ -47,17 +47,9 @@ ROSDEP_KEYS = {
     *('python3-serial', 'python3-tqdm', 'python3-yaml'),
 }
 
-TWO_TESTS = """
-def test_the_package_is_there():
-    import ros_pad
 
-def test_nothing():
-    pass
-"""
-
-
-@pytest.fixture(scope='module', params=[[], ['--symlink-install']], ids=['copied', 'linked'])
-def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
+@pytest.fixture(scope='module')
+def workspace(tmp_path_factory: pytest.TempPathFactory):
     """Return a colcon workspace in which ros_pad is built."""
     folder = tmp_path_factory.mktemp('workspace')
     source = folder / 'src' / 'ros_pad'
@@ -66,24 +58,16 @@ def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
         shutil.copy(ROOT / name, source)
     for name in ('config', 'launch', 'resource', 'ros_pad'):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns('__pycache__'))
-    (source / 'test').mkdir()
-    (source / 'test' / 'test_two.py').write_text(TWO_TESTS, encoding='utf-8')
-    assert '1 package finished' in colcon(folder, 'build', *request.param)
-    return folder
-
-
-def colcon(workspace: pathlib.Path, *arguments: str) -> str:
-    """Run a command of colcon in a workspace, which must succeed; return what it prints."""
     child = subprocess.run(
-        [sys.executable, '-m', 'colcon', *arguments],
-        cwd=workspace,
-        env=os.environ | {'COLCON_HOME': str(workspace)},
+        [sys.executable, '-m', 'colcon', 'build'],
+        cwd=folder,
+        env=os.environ | {'COLCON_HOME': str(folder)},
         capture_output=True,
         text=True,
         timeout=120,
     )
     assert child.returncode == 0, child.stdout + child.stderr
-    return child.stdout
+    return folder
 
 
 def in_workspace(workspace: pathlib.Path, *command: str) -> str:
@@ -141,36 +125,8 @@ print(shared_folder())
 """
 
 
-def test_colcon_runs_the_tests_and_keeps_their_results(workspace: pathlib.Path):
-    colcon(workspace, 'test', '--pytest-args', '-p', 'no:cacheprovider')
-    summary = colcon(workspace, 'test-result')
-    assert 'Summary: 2 tests, 0 errors, 0 failures, 0 skipped' in summary
-
-
-ENTRY_POINTS = """
-import importlib.metadata, sys
-ros_pad = importlib.metadata.distribution('ros_pad')
-for entry in ros_pad.entry_points.select(group='console_scripts'):
-    assert callable(entry.load())
-    print(entry.name, sys.modules[entry.module].__file__)
-"""
-
-
-def test_every_executable_has_its_entry_point_in_the_workspace(workspace: pathlib.Path):
-    lines = in_workspace(workspace, sys.executable, '-c', ENTRY_POINTS).splitlines()
-    place = dict(line.split(' ', 1) for line in lines)
-    assert set(place) == EXECUTABLES
-    for path in place.values():
-        assert pathlib.Path(path).resolve().is_relative_to(workspace.resolve())
-
-
 def test_package_xml():
     package = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
-    assert package.get('format') == '3'
-    assert package.findtext('name') == 'ros_pad'
-    assert package.findtext('license') == 'Apache-2.0'
-    licence = package.find('license').get('file')
-    assert 'Apache License' in (ROOT / licence).read_text(encoding='utf-8')
     assert package.findtext('export/build_type') == 'ament_python'
     assert package.findtext('version') == ros_pad.__version__
     keys = {node.text for node in package if node.tag.endswith('depend')}

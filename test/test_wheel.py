@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
@@ -176,25 +175,6 @@ def test_the_metadata_are_those_of_package_xml(found: dict):
     assert about['version'] == found['version'] == ros_pad.__version__
     assert about['version'] == package.findtext('version')
     assert about['license_expression'] == package.findtext('license')
-    urls = dict(each.split(', ', 1) for each in about['project_url'])
-    kinds = {'website': 'Documentation', 'repository': 'Source', 'bugtracker': 'Issues'}
-    for kind, label in kinds.items():
-        assert urls[label] == package.findtext(f'url[@type="{kind}"]')
-
-
-def test_links_of_the_readme_are_absolute_on_an_index_page(found: dict):
-    text = found['about']['description']
-    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
-    links = re.findall(r'\]\(([^)]*)\)', text)
-    own = re.findall(r'\]\(([^)]*)\)', readme)
-    assert len(links) == len(own)
-    for link, relative in zip(links, own, strict=True):
-        assert re.match(r'https://', link)
-        assert link.endswith(relative)
-    pictures = re.findall(r'!\[[^]]*\]\(([^)]*)\)', text)
-    assert len(pictures) == 2
-    assert all('/raw/' in each for each in pictures)
-    assert not any('/raw/' in each for each in set(links) - set(pictures))
 
 
 def test_pad_works_outside_of_a_checkout(pad, tmp_path: pathlib.Path):
@@ -231,11 +211,3 @@ def test_without_matplotlib_pad_does_the_rest(pad, tmp_path: pathlib.Path):
     assert not (tmp_path / 'a.png').exists()
     study = (sys.executable, '-m', 'studies', 'contact')
     assert remedy in run(*study, status=2, cwd=ROOT, env=outside(**without))
-
-
-def test_pip_install_target(wheel: pathlib.Path, tmp_path: pathlib.Path):
-    pip('--target', tmp_path / 'here', wheel)
-    libraries = f'{tmp_path / "here"}{os.pathsep}{LIBRARIES}'
-    code = 'from ros_pad.configuration import shared_folder; print(shared_folder())'
-    place = run(sys.executable, '-c', code, cwd='/', env=outside(PYTHONPATH=libraries)).strip()
-    assert place == str(tmp_path / 'here' / 'share' / 'ros_pad' / 'config')

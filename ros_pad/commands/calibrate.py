@@ -21,51 +21,30 @@ from ros_pad.errors import ConfigError, InvalidInput, PadError
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'calibrate',
-        run,
+    text = (
         'Fit a foot to measured shapes and forces; write its YAML file, and beside it a picture '
-        'of the fit and its residuals.',
+        'of the fit and its residuals.'
+    )
+    example = (
         'pad calibrate my_pads.csv --foot large37 --out my_foot.yaml\n'
-        'pad calibrate my_pads.csv --material dragon_skin_10 --thickness 0.4e-3',
+        'pad calibrate my_pads.csv --material dragon_skin_10 --thickness 0.4e-3'
     )
-    part.add_argument(
-        'csv',
-        metavar='CSV',
-        type=pathlib.Path,
-        help='measurements, with units in the header: docs/calibrate.md describes them, '
-        'config/measurements/thesis.csv is an example',
-    )
-    part.add_argument(
-        '--foot',
-        default='large37',
-        help='foot whose values the fit starts from, and keeps where nothing was measured: a name '
-        'in config/feet or a YAML file (default large37)',
-    )
-    part.add_argument(
-        '--material',
-        help='of the pads in place of what the foot has: a name in config/materials or a YAML '
-        'file; one factor on its stresses is fitted',
-    )
-    part.add_argument('--thickness', type=float, metavar='M', help='thickness of their sheet, m')
-    part.add_argument(
-        '--film-thickness',
-        type=float,
-        default=3.0e-4,
-        metavar='M',
-        help='of the liquid on the wet floor before a foot lands, m (default %(default)g)',
-    )
-    part.add_argument(
-        '--viscosity',
-        type=float,
-        default=1.0e-3,
-        metavar='PA_S',
-        help='of that liquid, Pa s (default %(default)g, water)',
-    )
-    part.add_argument('--out', help='foot to write (default: CSV_foot.yaml here)', **FILE)
-    part.add_argument('--force', action='store_true', help='replace existing files')
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    part = add_command(commands, 'calibrate', run, text, example)
+    add = part.add_argument
+    text = 'measurements, as docs/calibrate.md and config/measurements/thesis.csv have them'
+    add('csv', metavar='CSV', type=pathlib.Path, help=text)
+    text = 'start of the fit, kept where nothing was measured: a name in config/feet or YAML file'
+    add('--foot', default='large37', help=f'{text} (default %(default)s)')
+    text = 'of the pads in place of what the foot has: a name in config/materials or a YAML file'
+    add('--material', help=text)
+    add('--thickness', type=float, metavar='M', help='of their sheet, m')
+    text = 'of liquid on the wet floor before a foot lands, m (default %(default)g)'
+    add('--film-thickness', type=float, default=3.0e-4, metavar='M', help=text)
+    text = 'of that liquid, Pa s (default %(default)g, water)'
+    add('--viscosity', type=float, default=1.0e-3, metavar='PA_S', help=text)
+    add('--out', help='foot to write (default: CSV_foot.yaml here)', **FILE)
+    add('--force', action='store_true', help='replace existing files')
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -39,49 +39,31 @@ def add(commands: Commands) -> None:
     """Add the command and its arguments."""
     example = 'pad contact --pressure 75000 --force 0.1'
     part = add_command(commands, 'contact', run, _DESCRIPTION, example)
-    pressure: dict[str, Any] = {'type': float, 'metavar': 'PA', 'required': True}
-    part.add_argument('--pressure', help='gauge pressure in the pad, Pa', **pressure)
-    part.add_argument('--force', type=float, default=0.0, metavar='N', help='load on the pad, N')
+    add = part.add_argument
+    text = 'gauge pressure in the pad, Pa'
+    add('--pressure', type=float, required=True, metavar='PA', help=text)
+    add('--force', type=float, default=0.0, metavar='N', help='load on the pad, N (0)')
     which = part.add_mutually_exclusive_group()
-    which.add_argument(
-        '--pad',
-        choices=('large', 'small'),
-        default='large',
-        help="one of the thesis' pads: radius 1.5 mm (large, default) or 0.5 mm (small)",
-    )
+    text = 'of the thesis: radius 1.5 mm (large, default) or 0.5 mm (small)'
+    which.add_argument('--pad', choices=('large', 'small'), default='large', help=text)
     which.add_argument('--foot', help='the pad of a foot: a name in config/feet or a YAML file')
-    which.add_argument(
-        '--material',
-        help='a pad of a material: a name in config/materials or a YAML file, with --radius and '
-        '--thickness',
-    )
-    part.add_argument('--radius', type=float, metavar='M', help='of a pad of a material, m')
-    part.add_argument('--thickness', type=float, metavar='M', help='of a pad of a material, m')
-    part.add_argument(
-        '--edge',
-        choices=tuple(HIGHEST),
-        help='how the sheet of a pad of a material is held at its rim: its free dome is corrected '
-        'for thickness (default: a membrane)',
-    )
-    part.add_argument(
-        '--adhesion',
-        choices=tuple(ADHESION_SIGNS),
-        help='sign of the adhesion between pad and floor (default matlab: the floor attracts); '
-        'pads of a material have none',
-    )
-    part.add_argument(
+    text = 'of a pad with --radius and --thickness: a name in config/materials or a YAML file'
+    which.add_argument('--material', help=text)
+    add('--radius', type=float, metavar='M', help='of a pad of a material, m')
+    add('--thickness', type=float, metavar='M', help='of a pad of a material, m')
+    text = 'how its sheet is held at the rim: the free dome is corrected for thickness'
+    add('--edge', choices=tuple(HIGHEST), help=text)
+    text = 'sign between pad and floor (default matlab: the floor attracts); none with a material'
+    add('--adhesion', choices=tuple(ADHESION_SIGNS), help=text)
+    add(
         '--model',
         choices=MODELS,
         help='thesis: spherical dome (default); membrane: exact and slower, but the free dome and '
         'the force limits remain those of the spherical dome; pads of a material are membranes',
     )
-    part.add_argument(
-        '--liquid',
-        choices=('water', 'thesis'),
-        default='water',
-        help="surface tensions of water on silicone (default), or those of the thesis' appendix",
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    text = "surface tensions of water on silicone (default), or those of the thesis' appendix"
+    add('--liquid', choices=('water', 'thesis'), default='water', help=text)
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -170,7 +152,9 @@ def _shapes(pad: contact.Pad, options: argparse.Namespace) -> Iterator[tuple[str
 
 
 def _show(values: dict[str, Any], ends: dict[str, float]) -> None:
-    print(f'pad {values["pad"]}, {values["pressure_pa"]:g} Pa gauge, {values["force_n"]:g} N')
+    pad, pressure, force = values['pad'], values['pressure_pa'], values['force_n']
+    name = f'{pad} pad' if pad in ('large', 'small') else f'pad of {pad}'
+    print(f'{name}, {pressure:g} Pa gauge, {force:g} N')
     for part, title in _TITLES.items():
         if part not in values:
             continue

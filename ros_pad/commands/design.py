@@ -31,47 +31,34 @@ SHEETS = (2.0 / 15.0, 4.0 / 15.0, 6.0 / 15.0)  # thickness over radius: 0.4 mm o
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'design',
-        run,
+    text = (
         'Compute number, load, pressure and height of rise of the pads on a sole.\nOne of '
         '--sole-radius and --foot is needed.\nWith --material, or a foot whose pads name one: a '
         'table of pads of each material and thickness, with intervals from what is unsure of the '
-        'materials.',
+        'materials.'
+    )
+    example = (
         'pad design --load 7 --foot large37 --figure design.png\n'
-        'pad design --load 2 --sole-radius 0.017 --material all --thickness 0.2e-3 0.4e-3',
+        'pad design --load 2 --sole-radius 0.017 --material all --thickness 0.2e-3 0.4e-3'
     )
-    part.add_argument('--load', type=float, required=True, metavar='N', help='load on one foot, N')
-    part.add_argument('--sole-radius', type=float, metavar='M', help='radius of the sole, m')
-    part.add_argument('--radius', type=float, metavar='M', help='radius of a pad, m (0.0015)')
-    part.add_argument('--stiffness', type=float, metavar='N/M', help='of a pad, N/m (40)')
-    part.add_argument(
-        '--pressure', type=float, metavar='PA', help='highest of the supply, Pa gauge (90000)'
-    )
-    part.add_argument('--margin', type=float, default=1.2, help='factor on the load (%(default)g)')
-    part.add_argument(
-        '--criterion',
-        choices=CRITERIA,
-        help=f'of the force limit ({DEFAULT_CRITERION}; of materials {MATERIAL_CRITERION})',
-    )
-    part.add_argument(
-        '--material', nargs='+', help='names in config/materials, YAML files, or all, to compare'
-    )
-    part.add_argument(
-        '--thickness',
-        nargs='+',
-        type=float,
-        metavar='M',
-        help='of their sheets, m (2/15, 4/15 and 6/15 of the radius, or that of the foot)',
-    )
-    part.add_argument(
-        '--foot',
-        help='a name in config/feet or a YAML file: sole, pad, number of pads, ceiling and '
-        'criterion are taken from this foot unless an option gives them',
-    )
-    part.add_argument('--figure', help='draw the table into a new .png, .pdf or .svg', **FILE)
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    part = add_command(commands, 'design', run, text, example)
+    add = part.add_argument
+    add('--load', type=float, required=True, metavar='N', help='on one foot, N')
+    add('--sole-radius', type=float, metavar='M', help='radius of the sole, m')
+    add('--radius', type=float, metavar='M', help='of a pad, m (0.0015)')
+    add('--stiffness', type=float, metavar='N/M', help='of a pad, N/m (40)')
+    add('--pressure', type=float, metavar='PA', help='highest of the supply, Pa gauge (90000)')
+    add('--margin', type=float, default=1.2, help='factor on the load (%(default)g)')
+    text = f'of the force limit ({DEFAULT_CRITERION}; of materials {MATERIAL_CRITERION})'
+    add('--criterion', choices=CRITERIA, help=text)
+    text = 'names in config/materials, YAML files, or all, to compare'
+    add('--material', nargs='+', help=text)
+    text = 'of their sheets, m (2/15, 4/15 and 6/15 of the radius, or that of the foot)'
+    add('--thickness', nargs='+', type=float, metavar='M', help=text)
+    text = 'a name in config/feet or a YAML file, for sole, pads, ceiling and criterion'
+    add('--foot', help=text)
+    add('--figure', help='draw the table into a new .png, .pdf or .svg', **FILE)
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -29,21 +29,21 @@ WORDS = {
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'replay',
-        run,
+    text = (
         'Pass recorded wrenches (N), positions (m) and pressures (Pa) through estimators and '
         'controller again, and compare the results with the recorded ones; try other parameters.\n'
         'The motion stays as recorded: only estimates and decisions may change.\nExit status: 0 no'
         ' difference except for rounding or after a gap in the recording; 1 another difference; 2 '
-        'bad input.',
-        'pad replay bags/hexapod_patches/bag --set wet_prior=0.3 --figure prior.png\n'
-        '         pad replay my_bag --remap leg_{leg}/wrench:=/foot_{leg}/ft',
+        'bad input.'
     )
-    bag = 'folder of a bag, or one MCAP file'
-    part.add_argument('bag', metavar='BAG', type=pathlib.Path, help=bag)
-    part.add_argument(
+    example = (
+        'pad replay bags/hexapod_patches/bag --set wet_prior=0.3 --figure prior.png\n'
+        'pad replay my_bag --remap leg_{leg}/wrench:=/foot_{leg}/ft'
+    )
+    part = add_command(commands, 'replay', run, text, example)
+    add = part.add_argument
+    add('bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file')
+    add(
         '--set',
         action='append',
         default=[],
@@ -52,11 +52,9 @@ def add(commands: Commands) -> None:
         'such as force_noise (N), expected_load (N), dome_pressure (Pa gauge) or policy.dwell '
         '(steps); may be given more than once',
     )
-    policy = "rule that chooses morphologies (default: the bag's)"
-    part.add_argument('--policy', choices=POLICIES, help=policy)
-    foot = "a foot other than the bag's: a name in config/feet or a YAML file"
-    part.add_argument('--foot', help=foot)
-    part.add_argument(
+    add('--policy', choices=POLICIES, help="chooses morphologies (default: the bag's)")
+    add('--foot', help="other than the bag's: a name in config/feet or a YAML file")
+    add(
         '--remap',
         action='append',
         default=[],
@@ -65,14 +63,11 @@ def add(commands: Commands) -> None:
         "(leg_1/wrench:=/left/ft) or for all legs, with '{leg}' for the number "
         "('leg_{leg}/wrench:=/foot_{leg}/ft'); may be given more than once",
     )
-    namespace = 'namespace of the robot, such as /robot_1 (default: the only one)'
-    part.add_argument('--namespace', help=namespace)
-    figure = (
-        'draw P(wet) and set-points (kPa) of every leg, recorded and replayed, into a new file'
-    )
-    part.add_argument('--figure', help=f'{figure} (.png, .svg, .pdf)', **FILE)
-    part.add_argument('--out', help='write the replayed topics into a new bag', **FOLDER)
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    add('--namespace', help='of the robot, such as /robot_1 (default: the only one)')
+    text = 'draw P(wet) and set-points, recorded and replayed, into a new .png, .svg or .pdf'
+    add('--figure', help=text, **FILE)
+    add('--out', help='write the replayed topics into a new bag', **FOLDER)
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -26,31 +26,23 @@ THESIS = 'thesis_figures.html'
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'report',
-        run,
+    text = (
         'Write the HTML report of a bag or of a sweep, or a page with the figures of the thesis '
         'as ros_pad computes them; write figures for a paper.\nA page is one file that needs no '
-        'network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.',
-        'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures',
+        'network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.'
     )
-    path: dict[str, Any] = {'type': pathlib.Path, 'metavar': 'PATH', 'nargs': '?'}
-    part.add_argument('path', help='folder of a bag or of a sweep', **path)
-    part.add_argument(
-        '--thesis',
-        action='store_true',
-        help="draw the thesis' figures, without PATH; needs a checkout of ros_pad and about 45 s",
-    )
-    part.add_argument(
-        '--out',
-        **FILE,
-        help='page to write (default: report.html beside the bag or in the folder of the sweep, '
-        f'{THESIS} in this folder; no page with --figures)',
-    )
+    example = 'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures'
+    part = add_command(commands, 'report', run, text, example)
+    add = part.add_argument
+    path: dict[str, Any] = FOLDER | {'metavar': 'PATH', 'nargs': '?'}
+    add('path', help='folder of a bag or of a sweep', **path)
+    text = "draw the thesis' figures, without PATH; needs a checkout of ros_pad and about 45 s"
+    add('--thesis', action='store_true', help=text)
+    text = f'page to write (default: report.html beside bag or sweep, or {THESIS} here)'
+    add('--out', help=text, **FILE)
     text = 'write each figure into this folder as PDF and PNG; no page without --out'
-    part.add_argument('--figures', help=text, **FOLDER)
-    part.add_argument('--force', action='store_true', help='replace existing files')
+    add('--figures', help=text, **FOLDER)
+    add('--force', action='store_true', help='replace existing files')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -14,15 +14,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ros_pad.bags import annotate
-from ros_pad.commands.command import (
-    FILE,
-    FOLDER,
-    INTERRUPTED,
-    Commands,
-    add_command,
-    complain,
-    print_table,
-)
+from ros_pad.commands.command import FILE, FOLDER, INTERRUPTED, Commands, add_command, complain
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
@@ -58,53 +50,31 @@ _WALK = {
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'run',
-        run,
+    text = (
         'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report; for a bench '
-        'scene, draw the figures of the thesis.',
-        'pad run hexapod_patches --seed 3',
+        'scene, draw the figures of the thesis.'
     )
-    part.add_argument('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
-    foot = "a foot other than the scene's: a name in config/feet or a YAML file"
-    part.add_argument('--foot', help=foot)
-    policy = "rule that chooses morphologies (default: the scene's)"
-    part.add_argument('--policy', choices=POLICIES, help=policy)
-    part.add_argument('--seed', type=int, default=0, help='seed of floor and noise (default 0)')
-    part.add_argument('--cycles', type=int, help="gait cycles (default: the scene's)")
-    part.add_argument(
-        '--fidelity',
-        choices=levels.FIDELITIES,
-        default='auto',
-        help='L0 is the leg on its rail, L1 a robot in the plane, L2 a robot with joints '
-        '(MuJoCo); auto (default) takes the cheapest that is accurate enough for the scene',
+    part = add_command(commands, 'run', run, text, 'pad run hexapod_patches --seed 3')
+    add = part.add_argument
+    add('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
+    add('--foot', help="other than the scene's: a name in config/feet or a YAML file")
+    add('--policy', choices=POLICIES, help="chooses morphologies (default: the scene's)")
+    add('--seed', type=int, default=0, help='seed of floor and noise (default 0)')
+    add('--cycles', type=int, help="gait cycles (default: the scene's)")
+    text = (
+        'L0: leg on a rail, L1: robot in the plane, L2: with joints; auto: cheapest that will do'
     )
-    part.add_argument(
-        '--sensing',
-        choices=SOURCES,
-        default='markers',
-        help='what slip is estimated from: markers on the feet (default), or joints, IMU and '
-        'forces in the axes of the feet, as robots have them; joints needs L2',
-    )
-    known = 'begin with what feet have learnt of friction: learnt.yaml of an earlier trial'
-    part.add_argument('--learnt', help=known, **FILE)
-    without = 'walk without nodes and bag; much faster'
-    part.add_argument('--no-ros', action='store_true', help=without)
-    part.add_argument(
-        '--no-compare',
-        action='store_true',
-        help='do not also walk the other policies on the same ground, as an adaptive run does',
-    )
-    part.add_argument(
-        '--live',
-        action='store_true',
-        help='share the topics with other processes, by default in the whole subnet: '
-        'real regulators in the same ROS domain receive the set-points',
-    )
-    out = 'new folder for the results (default: runs/<scene>_...)'
-    part.add_argument('--out', help=out, **FOLDER)
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    add('--fidelity', choices=levels.FIDELITIES, default='auto', help=text)
+    text = 'what slip is estimated from; joints, with IMU and forces as robots have them, needs L2'
+    add('--sensing', choices=SOURCES, default='markers', help=text)
+    add('--learnt', help='begin with the friction of learnt.yaml of an earlier trial', **FILE)
+    add('--no-ros', action='store_true', help='walk without nodes and bag; much faster')
+    text = 'do not also walk the other policies on the same ground, as an adaptive run does'
+    add('--no-compare', action='store_true', help=text)
+    text = 'share the topics, by default in the whole subnet: real regulators get the set-points'
+    add('--live', action='store_true', help=text)
+    add('--out', help='new folder for the results (default: runs/<scene>_...)', **FOLDER)
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -331,20 +301,22 @@ def _show(trial: Trial) -> None:
         f' {own.cycles:.3g} cycles, {trial.real_time_factor:.1f} times real time\n'
         f'fidelity: {labels.promise(trial)}\nsensing:  {settings["sensing"]}\n'
     )
-    table: list[list[str]] = []
-    for row in [{'policy': trial.policy, **own.as_dict()}, *settings['comparison']]:
+    rows = [{'policy': trial.policy, **own.as_dict()}, *settings['comparison']]
+    for row in rows:
         if row.get('goal_m') is not None:
             seconds = row['time_to_goal_s']
             after = 'not reached' if seconds is None else f'after {seconds:.1f} s'
             print(f'{row["policy"]}: goal of {row["goal_m"]:g} m {after}')
+    print(f'policy      mm/cycle  against {trial.policy:8}   slip path per foot   switches')
+    for row in rows:
         advance, gain = row['distance_per_cycle_m'], ''
-        if table and own.distance_per_cycle_m:
+        if row is not rows[0] and own.distance_per_cycle_m:
             gain = f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+.0f} %'
         slip = sum(row['slip_path_m']) / len(row['slip_path_m'])
-        switches = str(sum(row['switches']))
-        table.append([row['policy'], f'{1e3 * advance:.1f}', gain, f'{slip:.2f} m', switches])
-    against = f'against {trial.policy}'
-    print_table(['policy', 'mm/cycle', against, 'slip path per foot', 'switches'], table)
+        print(
+            f'{row["policy"]:10} {1e3 * advance:9.1f}  {gain:>16}'
+            f' {slip:18.2f} m {sum(row["switches"]):10d}'
+        )
     taken = ', '.join(term['term'] for term in settings['taken'])
     print(
         *(f'stayed flat: {refusal}' for refusal in own.refusals),

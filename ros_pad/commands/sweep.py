@@ -15,7 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.commands.command import INTERRUPTED, Commands, add_command, complain, print_table
+from ros_pad.commands.command import (
+    FOLDER,
+    INTERRUPTED,
+    Commands,
+    add_command,
+    complain,
+    print_table,
+)
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import integer
@@ -29,28 +36,23 @@ MOST = 100_000  # largest number of values in a range, and of seeds in FIRST:LAS
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'sweep',
-        run,
+    text = (
         'Run every combination of scenes, policies, seeds and parameters, without ROS, on all '
         'cores or on a Dask cluster; write trials.csv, a picture with confidence intervals, and a '
         'page.\nA sweep that was stopped or killed continues when the same command is given again '
-        'with --out and its folder; seeds, policies, scenes and values may be added.',
+        'with --out and its folder; seeds, policies, scenes and values may be added.'
+    )
+    example = (
         'pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 '
-        '--set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing',
+        '--set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing'
     )
-    part.add_argument('scenes', metavar='SCENE', nargs='+', help='names of scenes, or YAML files')
-    part.add_argument(
-        '--policy', metavar='NAMES', help="flat,dome,adaptive,oracle (default: each scene's own)"
-    )
-    part.add_argument(
-        '--seed',
-        default='0:4',
-        metavar='LIST',
-        help='seeds of floor and noise, with commas, or FIRST:LAST (default 0:4, five seeds)',
-    )
-    part.add_argument(
+    part = add_command(commands, 'sweep', run, text, example)
+    add = part.add_argument
+    add('scenes', metavar='SCENE', nargs='+', help='names of scenes, or YAML files')
+    add('--policy', metavar='NAMES', help="flat,dome,adaptive,oracle (default: each scene's own)")
+    text = 'seeds of floor and noise, with commas, or FIRST:LAST (default 0:4)'
+    add('--seed', default='0:4', metavar='LIST', help=text)
+    add(
         '--set',
         action='append',
         default=[],
@@ -60,25 +62,14 @@ def add(commands: Commands) -> None:
         'the estimator node (filter_period, s) or of the adaptive policy (policy.wet_above). May '
         'be given more than once; the first NAME with several values is the axis of the picture',
     )
-    part.add_argument(
-        '--fidelity',
-        choices=levels.FIDELITIES,
-        default='auto',
-        help='fidelity level; auto (default) chooses it for each scene and its parameters',
-    )
+    add('--fidelity', choices=levels.FIDELITIES, default='auto', help='level; auto chooses it')
     where = part.add_mutually_exclusive_group()
     where.add_argument('--workers', type=int, help='number of processes (default: one for a core)')
-    where.add_argument(
-        '--scheduler', metavar='ADDRESS', help='of a Dask scheduler (tcp://host:8786) to run on'
-    )
-    part.add_argument('--retry', action='store_true', help='also run failed trials again')
-    part.add_argument(
-        '--out',
-        type=pathlib.Path,
-        metavar='DIR',
-        help='new folder, or the folder of this sweep, which continues (default: runs/sweep...)',
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    text = 'address of a Dask scheduler (tcp://host:8786) to run on'
+    where.add_argument('--scheduler', metavar='ADDRESS', help=text)
+    add('--retry', action='store_true', help='also run failed trials again')
+    add('--out', help='new folder, or that of this sweep, which continues', **FOLDER)
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:

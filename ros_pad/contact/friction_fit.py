@@ -87,7 +87,9 @@ def fit_friction(
         if best.identified():
             fitted, fit = trial, best
     constants = []
-    note = 'not identified by these forces: kept' if len(friction.load) else 'none was measured'
+    note = 'not identified by these forces: kept'
+    if not len(friction.load):
+        note = 'no friction was measured'
     for name in FITTED:
         if fit is not None and name in fitted:
             words = f'{len(friction.load)} forces'

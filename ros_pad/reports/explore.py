@@ -44,10 +44,9 @@ LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
 STATES = ('flat, dry', 'flat, wet', 'dome, dry', 'dome, wet')
 NOTE = (
     'Friction rests on assumed constants, each of which may be wrong by a factor of two:'
-    ' docs/assumptions.md. The points on the drawing of the force limit are all criteria that the'
-    ' pads have.'
+    ' docs/assumptions.md.'
 )
-_LOADS, _PRESSURES = 30, 61  # points of the curves
+_LOADS = 30  # points of the curves
 _TICK, _LONGEST = 1e-3, 5.0  # s, see time_to
 
 
@@ -173,15 +172,11 @@ class Explored:
         The dome free and under its share of the load, and the ring of liquid.
     limits : dict of str to float
         Force limit of one pad by criterion, N; NaN above the largest pressure of a criterion.
-    limit_curve : tuple of array
-        Pressures up to the ceiling, Pa, and the limit of the foot there, N.
     loads, curves
         Loads, N, and the tangential capacity there, N, by state; the last is the present load.
     switching : Switching
-    places : array
-        Centres of the pads, m, as rows.
-    pitch, touching : float
-        Distance of neighbouring pads, m; share of a flat sole that touches.
+    pitch : float
+        Distance of neighbouring pads in a hexagonal pattern over the sole, m.
     """
 
     inputs: Inputs
@@ -191,13 +186,10 @@ class Explored:
     pressed: Pressed | None
     ring: Meniscus | None
     limits: Mapping[str, float]
-    limit_curve: tuple[Array, Array] | None
     loads: Array
     curves: Mapping[str, Array]
     switching: Switching | None
-    places: Array | None
     pitch: float
-    touching: float
 
     @property
     def grip(self) -> dict[str, float]:
@@ -261,8 +253,8 @@ def explore(inputs: Inputs) -> Explored:
     foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)
     parts('pressure', _below_ceiling, inputs, foot)
     free = parts('pressure', inflate, pad, pressure)
-    around = functools.partial(_places, inputs, free, parts)
-    places, pitch = parts('pads sole_radius radius', around) or (None, math.nan)
+    around = functools.partial(_pitch, inputs, free, parts)
+    pitch = parts('pads sole_radius radius', around)
     limits = parts('pressure', _limits, pad, pressure) or {}
     parts('pressure', _within_limit, inputs, foot, limits, parts)
     loads, curves = parts('load', _curves, inputs, foot, limits, parts) or (np.zeros(1), {})
@@ -275,13 +267,10 @@ def explore(inputs: Inputs) -> Explored:
         pressed=pressed,
         ring=parts('', _ring, inputs, pressed, parts),
         limits=limits,
-        limit_curve=None if foot is None else _limit_curve(foot),
         loads=loads,
         curves=curves,
         switching=parts('pressure bore hose', _switched, inputs, foot, parts),
-        places=places,
-        pitch=pitch,
-        touching=parts('load roughness', _touching, inputs, foot) or 0.0,
+        pitch=math.nan if pitch is None else pitch,
         remarks=tuple(parts.remarks),
     )
 
@@ -338,23 +327,22 @@ def _below_ceiling(inputs: Inputs, foot: Foot) -> None:
     quantity('pressure', 1e-3 * inputs['pressure'], 'kPa, the ceiling of the foot', high=ceiling)
 
 
-def _places(inputs: Inputs, free: Inflated | None, parts: _Parts) -> tuple[Array, float]:
-    """Return centres of the pads in a hexagonal pattern over the sole, and their pitch, m."""
-    radius, lattice = inputs['radius'], hexagonal(inputs['pads'])
-    reach = float(np.hypot(*lattice.T).max())
+def _pitch(inputs: Inputs, free: Inflated | None, parts: _Parts) -> float:
+    """Return the pitch of the pads in a hexagonal pattern over the sole, m."""
+    radius = inputs['radius']
+    reach = float(np.hypot(*hexagonal(inputs['pads']).T).max())
     pitch = max(inputs['sole_radius'] - radius, 0.0) / max(reach, 0.5)
-    width = 0.0
-    if free is not None:
-        width = 2.0 * (free.sphere_radius if free.height > radius else radius)
-    if inputs['pads'] > 1 and pitch < max(width, 2.0 * radius):
+    width = 2.0 * radius
+    if free is not None and free.height > radius:
+        width = 2.0 * free.sphere_radius
+    if inputs['pads'] > 1 and pitch < width:
         what = 'pads overlap' if pitch < 2.0 * radius else 'free domes touch one another'
-        width = max(width, 2.0 * radius)
         parts.note(
             'pads',
             f'in a hexagonal pattern the {what}: they are {1e3 * width:.3g} mm wide at a pitch of'
             f' {1e3 * pitch:.3g} mm',
         )
-    return pitch * lattice, pitch
+    return pitch
 
 
 def _limits(pad: Pad, pressure: float) -> dict[str, float]:
@@ -375,11 +363,6 @@ def _within_limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts
             f'above the force limit of the foot by the criterion {foot.limit}, {value:.4g} N: the'
             ' domes are pressed flat, and the sole carries the rest',
         )
-
-
-def _limit_curve(foot: Foot) -> tuple[Array, Array]:
-    pressures = np.linspace(0.0, foot.ceiling, _PRESSURES)
-    return pressures, np.array([foot.dome_load(math.inf, each) for each in pressures.tolist()])
 
 
 def _curves(
@@ -413,12 +396,6 @@ def _capacity(inputs: Inputs, foot: Foot, loads: Array, state: str) -> Array | N
             films = drained.drain(on_domes, load - on_domes, pressure, inputs['stand'])
         found.append(rough.resistance_of(on_domes, load - on_domes, pressure, *films))
     return np.array(found)
-
-
-def _touching(inputs: Inputs, foot: Foot) -> float:
-    """Return the share of a flat sole that touches."""
-    conforming = foot.on_rough(inputs['roughness']).conforming_pressure
-    return min(inputs['load'] / (conforming * foot.sole_area), 1.0)
 
 
 def _ring(inputs: Inputs, pressed: Pressed, parts: _Parts) -> Meniscus:

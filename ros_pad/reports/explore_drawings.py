@@ -16,7 +16,7 @@ from ros_pad.reports.explore import STATES, Explored
 from ros_pad.reports.style import BLACK, BLUE, PALE, STANCE, VERMILION
 
 WIDTH, HEIGHT = 480.0, 310.0
-NAMES = ('profile', 'sole', 'grip', 'limits')
+NAMES = ('profile', 'grip')
 STYLE = f"""
 .drawing text {{ font: 12px system-ui, "DejaVu Sans", Arial, sans-serif; fill: {BLACK}; }}
 .drawing .end {{ text-anchor: end; }} .drawing .middle {{ text-anchor: middle; }}
@@ -24,14 +24,11 @@ STYLE = f"""
 .drawing .axis {{ stroke: {PALE}; stroke-width: 1; }}
 .drawing .grid {{ stroke: {PALE}; stroke-width: 0.5; opacity: 0.5; }}
 .drawing .sole {{ fill: {STANCE}; stroke: {PALE}; }}
-.drawing .pad {{ stroke: {PALE}; stroke-width: 0.8; }}
 .drawing .dry {{ stroke: {VERMILION}; stroke-width: 2; }}
 .drawing .wet {{ stroke: {BLUE}; stroke-width: 2; }}
 .drawing .ink {{ stroke-width: 2; }}
 .drawing .flat, .drawing .free {{ stroke-dasharray: 6 4; }}
 .drawing .fill {{ fill: {VERMILION}; stroke: none; }} .drawing .fill.wet {{ fill: {BLUE}; }}
-.drawing .fill.contact {{ opacity: 0.75; }}
-.drawing .fill.point {{ fill: {BLACK}; }}
 """
 
 
@@ -101,8 +98,7 @@ class Plot:
 
 def drawings(found: Explored) -> dict[str, Drawing]:
     """Return the drawings of the page by name."""
-    made = profile(found), sole(found), grip(found), limits(found)
-    return dict(zip(NAMES, made, strict=True))
+    return {'profile': profile(found), 'grip': grip(found)}
 
 
 def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -> Array:
@@ -119,7 +115,7 @@ def profile(found: Explored) -> Drawing:
     """Draw the dome free and pressed on the floor; cut through its axis."""
     radius, free, pressed = found.inputs['radius'], found.free, found.pressed
     if found.free is None and found.pressed is None:
-        return Drawing('One pad on the floor', 'There is no pad.', _nothing())
+        return Drawing('One pad on the floor', 'There is no dome.', _nothing())
     tall = max(radius, *(each.height for each in (free, pressed) if each is not None), 0.0)
     scale = min((WIDTH - 40.0) / (3.2 * radius), (HEIGHT - 96.0) / tall)
     base, centre = 44.0, 0.5 * WIDTH
@@ -152,42 +148,6 @@ def profile(found: Explored) -> Drawing:
     return Drawing('One pad on the floor', f'Cut through one pad. {words}.', ''.join(body))
 
 
-def sole(found: Explored) -> Drawing:
-    """Draw the sole from below, flat and domed, with what touches the floor."""
-    if found.places is None:
-        return Drawing('Sole from below', 'There is no sole.', _nothing())
-    size, radius, pads = 0.22 * WIDTH, found.inputs['radius'], found.inputs['pads']
-    middle = 0.5 * HEIGHT - 14.0
-    scale = size / found.inputs['sole_radius']
-    body = []
-    for centre, name in ((0.26 * WIDTH, 'flat'), (0.74 * WIDTH, 'dome')):
-        body.append(f'<circle class="sole" cx="{centre:.1f}" cy="{middle:.1f}" r="{size:.1f}"/>')
-        if name == 'flat' and found.touching:
-            # What touches lies scattered over the whole sole: its share is the opacity.
-            body.append(
-                f'<circle class="fill" style="opacity:{0.75 * found.touching:.3f}"'
-                f' cx="{centre:.1f}" cy="{middle:.1f}" r="{size:.1f}"/>'
-            )
-        contact = found.pressed.contact_radius if name == 'dome' and found.pressed else 0.0
-        for x, y in found.places.tolist():
-            place = f'cx="{centre + scale * x:.1f}" cy="{middle + scale * y:.1f}"'
-            body.append(f'<circle class="pad" {place} r="{scale * radius:.2f}"/>')
-            if contact:
-                body.append(f'<circle class="fill contact" {place} r="{scale * contact:.2f}"/>')
-    area = math.pi * found.inputs['sole_radius'] ** 2
-    share = math.nan
-    if found.pressed is not None:
-        share = pads * math.pi * found.pressed.contact_radius**2 / area
-    words = [
-        f'flat: {100.0 * found.touching:.3g} % touches' if found.touching else 'flat: –',
-        'domes: –' if math.isnan(share) else f'domes: {100.0 * share:.3g} % touches',
-    ]
-    for share, text in zip((0.26, 0.74), words, strict=True):
-        body.append(_text(share * WIDTH, HEIGHT - 10.0, text, 'middle'))
-    alt = f'{found.inputs["pads"]} pads on the sole. {". ".join(words)} of the area of the sole.'
-    return Drawing('Sole from below', alt, ''.join(body))
-
-
 def grip(found: Explored) -> Drawing:
     """Draw the tangential capacity over the load in four states."""
     title, load = 'Grip over load', found.inputs['load']
@@ -210,34 +170,6 @@ def grip(found: Explored) -> Drawing:
         ]
     alt = '; '.join(f'{state} {value:.3g} N' for state, value in found.grip.items())
     return Drawing(title, f'Tangential capacity at the load: {alt}.', ''.join(plot.parts))
-
-
-def limits(found: Explored) -> Drawing:
-    """Draw the force limit of the foot over the pressure, with the load and other criteria."""
-    title, foot = 'Force limit over pressure', found.foot
-    if found.limit_curve is None or foot is None:
-        return Drawing(title, 'No force limit can be computed.', _nothing())
-    pressures, curve = found.limit_curve
-    there = {name: foot.pads * each for name, each in found.limits.items() if each == each}
-    load = found.inputs['load'] if 0.0 < found.inputs['load'] < math.inf else 0.0
-    top = 1.08 * max(float(curve.max()), load, *there.values())
-    plot = Plot(1e-3 * foot.ceiling, top, 'gauge pressure, kPa', 'force limit of the foot, N')
-    plot.line((1e-3 * pressures).tolist(), curve.tolist(), 'ink')
-    if load:
-        plot.line([0.0, plot.x_end], [load, load], 'dry')
-        plot.parts.append(_text(plot.left + 6.0, plot.y(load) - 5.0, 'load'))
-    now, lowest = 1e-3 * found.inputs['pressure'], math.inf
-    if found.limit is not None:
-        plot.line([now, now], [min(there.values()), max(there.values())], 'wet')
-        side = -9.0 if now > 0.6 * plot.x_end else 9.0
-        for name, value in sorted(there.items(), key=lambda each: each[1]):
-            lowest = min(plot.y(value) + 4.0, lowest - 13.0)
-            plot.point(now, value, '' if name == foot.limit else 'wet')
-            kind = 'end' if side < 0.0 else ''
-            plot.parts.append(_text(plot.x(now) + side, lowest, name, kind))
-    plot.parts.append(_text(plot.left, 16.0, f'line: {foot.limit}; points: every criterion'))
-    listed = ', '.join(f'{name} {value:.3g} N' for name, value in there.items())
-    return Drawing(title, f'Force limit of the foot: {listed}.', ''.join(plot.parts))
 
 
 def _nothing() -> str:
