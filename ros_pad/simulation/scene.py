@@ -531,7 +531,7 @@ def _named(table: Table, key: str, load: Callable[[str], Any]) -> Any:
         name = os.fspath(pathlib.Path(table.origin).parent / name)
     try:
         return load(name)
-    except ConfigError as error:
+    except (ConfigError, InvalidInput) as error:
         raise ConfigError(f'{table.origin}: {key}: {error}') from error
 
 
