@@ -10,8 +10,9 @@ import select
 import threading
 import time
 import tty
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any
 
 from ros_pad.configuration import choice, integer, number
 from ros_pad.errors import InvalidInput, TransportError
@@ -119,14 +120,46 @@ class Valve:
         return self._pressure
 
 
-class EmulatedDevice(Protocol):
-    """A device, or several on one bus, that answers commands."""
+class EmulatedDevice(ABC):
+    """A device, or several on one bus, that answers commands.
 
-    terminator: str
-    faults: FaultSchedule
+    Parameters
+    ----------
+    addresses : sequence of str
+        Names of the devices on the bus.
+    full_scale : float
+        Highest pressure, gauge Pa, above 0.
+    time_constant : float
+        Time constant of the pressures, s, above 0.
+    schedule : sequence of str
+        See :class:`FaultSchedule`.
+    """
 
+    FAULTS: tuple[str, ...] = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
+    terminator = '\n'
+
+    def __init__(
+        self,
+        addresses: Sequence[str],
+        full_scale: float,
+        time_constant: float,
+        schedule: Sequence[str],
+    ) -> None:
+        self.full_scale = number('full_scale', full_scale, 'Pa', above=True)
+        self.valves = {each: Valve(time_constant) for each in addresses}
+        self.faults = FaultSchedule(self.FAULTS, schedule)
+
+    @abstractmethod
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the answering address and its reply; None for no reply."""
+
+    def follow(self, address: str, setpoint: float) -> float:
+        """Set a valve as far as faults allow; return the set-point that the reply shows, Pa."""
+        if self.faults.act('echo', address):
+            setpoint *= 0.5
+        if not self.faults.act('analog_source', address):
+            self.valves[address].setpoint = setpoint
+        return setpoint
 
 
 class Emulator:
@@ -268,7 +301,7 @@ class Emulator:
         os.write(near, reply)
 
 
-class AlicatEmulator:
+class AlicatEmulator(EmulatedDevice):
     """Alicat pressure controllers on one bus.
 
     Parameters
@@ -289,8 +322,8 @@ class AlicatEmulator:
     """
 
     FAULTS = (
-        *LINE_FAULTS,
-        *('wrong_id', 'wrong_unit', 'rejection', 'analog_source', 'echo'),
+        *EmulatedDevice.FAULTS,
+        *('wrong_id', 'wrong_unit'),
         *(f'status={each}' for each in STATUS),
     )
     terminator = '\r'
@@ -314,10 +347,8 @@ class AlicatEmulator:
         self._unit = unit(units)
         self._firmware = firmware
         self._version = tuple(int(each) for each in firmware.split('v'))
-        self._full_scale = number('full_scale', full_scale, 'Pa', above=True)
-        self.valves = {each: Valve(time_constant) for each in unit_ids}
         self.locked: set[str] = set()
-        self.faults = FaultSchedule(self.FAULTS, schedule)
+        super().__init__(unit_ids, full_scale, time_constant, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the ID of the unit that answers and its reply; None if there is no such unit."""
@@ -357,17 +388,13 @@ class AlicatEmulator:
         return '?'
 
     def _set(self, address: str, text: str) -> str:
-        valve = self.valves[address]
         try:
             setpoint = float(text) * self._unit
         except ValueError:
             return '?'
-        if self.faults.act('rejection', address) or not 0.0 <= setpoint <= self._full_scale:
+        if self.faults.act('rejection', address) or not 0.0 <= setpoint <= self.full_scale:
             return '?'
-        if self.faults.act('echo', address):
-            setpoint *= 0.5
-        if not self.faults.act('analog_source', address):
-            valve.setpoint = setpoint
+        self.follow(address, setpoint)
         return self._frame(address)
 
     def _frame(self, address: str) -> str:
@@ -381,7 +408,7 @@ class AlicatEmulator:
         return f'{pressure / self._unit:+07.2f}'
 
 
-class SmcItvEmulator:
+class SmcItvEmulator(EmulatedDevice):
     """An SMC ITV on RS-232C, with the commands that two field programs use.
 
     Parameters
@@ -394,37 +421,28 @@ class SmcItvEmulator:
         See :class:`FaultSchedule`.
     """
 
-    FAULTS = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
     terminator = '\r\n'
 
     def __init__(
         self, full_scale: float = 100e3, time_constant: float = 0.1, schedule: Sequence[str] = ()
     ) -> None:
-        self._count = number('full_scale', full_scale, 'Pa', above=True) / FULL_COUNT
-        self.valve = Valve(time_constant)
-        self.faults = FaultSchedule(self.FAULTS, schedule)
+        super().__init__([''], full_scale, time_constant, schedule)
+        self._count = full_scale / FULL_COUNT
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return an empty address and the reply to one command."""
         order, *words = command.split() or ['']
-        setting = round(self.valve.setpoint / self._count)
-        rejected = self.faults.act('rejection')
-        if order == 'MON':
-            return '', str(round(self.valve.pressure / self._count))
-        if order == 'REQ':
-            return '', str(setting)
-        if order == 'SET' and len(words) == 1 and words[0].isdigit() and not rejected:
-            setting = min(int(words[0]), FULL_COUNT)
-        else:
+        value = self.valves[''].pressure if order == 'MON' else self.valves[''].setpoint
+        if order == 'SET':
+            if len(words) != 1 or not words[0].isdigit() or self.faults.act('rejection'):
+                return '', 'UNKNOWN COMMAND'
+            value = self.follow('', min(int(words[0]), FULL_COUNT) * self._count)
+        elif order not in ('MON', 'REQ'):
             return '', 'UNKNOWN COMMAND'
-        if self.faults.act('echo'):
-            setting //= 2
-        if not self.faults.act('analog_source'):
-            self.valve.setpoint = setting * self._count
-        return '', str(setting)
+        return '', str(round(value / self._count))
 
 
-class SerialTextEmulator:
+class SerialTextEmulator(EmulatedDevice):
     """A microcontroller board whose DACs drive SMC ITV, with the default lines of text.
 
     The reply to ``SET 1 2.500`` is ``OK 1 2.500``; the last number is the command voltage, 0 to
@@ -443,9 +461,6 @@ class SerialTextEmulator:
         See :class:`FaultSchedule`.
     """
 
-    FAULTS = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
-    terminator = '\n'
-
     def __init__(
         self,
         channels: int = 6,
@@ -453,32 +468,26 @@ class SerialTextEmulator:
         time_constant: float = 0.1,
         schedule: Sequence[str] = (),
     ) -> None:
-        count = integer('channels', channels, 1, 99)
-        self._full_scale = number('full_scale', full_scale, 'Pa', above=True)
-        self.valves = {str(each + 1): Valve(time_constant) for each in range(count)}
-        self.faults = FaultSchedule(self.FAULTS, schedule)
+        names = [str(each + 1) for each in range(integer('channels', channels, 1, 99))]
+        super().__init__(names, full_scale, time_constant, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the channel that a command names, and the reply to it."""
-        words = command.split()
-        order, channel = [*words, '', ''][:2]
+        order, channel, *values = [*command.split(), '', '']
         valve = self.valves.get(channel)
         if valve and order == 'READ':
-            return channel, f'{channel} {1.0 + 4.0 * valve.pressure / self._full_scale:.3f}'
+            return channel, f'{channel} {1.0 + 4.0 * valve.pressure / self.full_scale:.3f}'
         try:
-            volts = float(words[2])
+            volts = float(values[0])
         except (IndexError, ValueError):
             return channel, 'ERROR'
         if not valve or order != 'SET' or self.faults.act('rejection', channel):
             return channel, 'ERROR'
-        if self.faults.act('echo', channel):
-            volts *= 0.5
-        if not self.faults.act('analog_source', channel):
-            valve.setpoint = volts / 5.0 * self._full_scale
-        return channel, f'OK {channel} {volts:.3f}'
+        shown = self.follow(channel, volts / 5.0 * self.full_scale) / self.full_scale
+        return channel, f'OK {channel} {5.0 * shown:.3f}'
 
 
-EMULATORS: dict[str, type[AlicatEmulator | SmcItvEmulator | SerialTextEmulator]] = {
+EMULATORS: dict[str, Any] = {
     'alicat': AlicatEmulator,
     'smc_itv': SmcItvEmulator,
     'serial_text': SerialTextEmulator,
