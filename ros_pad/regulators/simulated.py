@@ -37,7 +37,7 @@ class SimulatedRegulator:
         Measured sonic conductance of the whole line, m³/(s Pa), instead of the hose formula.
     pad_volume : float or callable
         Air volume of the pads and their chamber, m³, or a function of the gauge pressure, Pa.
-    natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit : float
+    natural_frequency, damping, dead_time, dead_band, full_scale, quantum : float
         As for :class:`ros_pad.simulation.RegulatorModel`.
     sensor_resolution : float
         Smallest step of readings, Pa, 0.1 to 1000. With whole Pa an ambient pressure of
@@ -99,14 +99,13 @@ class SimulatedRegulator:
         dead_band: float = 0.005,
         full_scale: float = 100e3,
         quantum: float = 100.0,
-        slew_limit: float = math.inf,
         sensor_resolution: float = 10.0,
         sensor_noise: float = 0.0,
         seed: int = 0,
         faults: Sequence[Fault | str] = (),
     ) -> None:
         model = RegulatorModel(
-            natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit
+            natural_frequency, damping, dead_time, dead_band, full_scale, quantum
         )
         self._ceiling = number('ceiling', ceiling, 'Pa', 1.0, full_scale)
         self._resolution = number('sensor_resolution', sensor_resolution, 'Pa', 0.1, 1000.0)

@@ -133,9 +133,7 @@ class PlanarRobot:
             foot=model.foot._replace(limits=np.array(model.foot.limits)),
             floor=floor._replace(wet=np.array(floor.wet), heights=np.array(floor.heights)),
         )
-        self._walk = compiled.walk(
-            self.model, self.state, self.table, (0.0,) * len(self.legs), 1, True
-        )
+        self._walk = compiled.walk(self.model, self.state, self.table, (0.0,) * len(self.legs), 1)
 
     @property
     def body(self) -> Vector:
@@ -158,7 +156,7 @@ class PlanarRobot:
         NoConvergence
             When the friction step does not converge.
         """
-        self._advance(pressures, 1, False)
+        self._advance(pressures, 1)
 
     def walk(self, pressures: Sequence[float], steps: int) -> int:
         """Make many steps with the same pressures.
@@ -188,14 +186,12 @@ class PlanarRobot:
         """
         integer('steps', steps)
         before = self.state[planar_step.STEPS]
-        self._advance(pressures, steps, True)
+        self._advance(pressures, steps)
         return round(self.state[planar_step.STEPS] - before)
 
-    def _advance(self, pressures: Sequence[float], steps: int, upright: bool) -> None:
+    def _advance(self, pressures: Sequence[float], steps: int) -> None:
         check_pressures(pressures, len(self.legs))
-        converged = self._walk(
-            self.model, self.state, self.table, tuple(pressures), steps, upright
-        )
+        converged = self._walk(self.model, self.state, self.table, tuple(pressures), steps)
         if not converged:
             raise NoConvergence(
                 f'friction step of {self.period:g} s does not converge: shorten the period, or'

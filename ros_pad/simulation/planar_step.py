@@ -25,21 +25,23 @@ from ros_pad.simulation.planar_model import PlanarModel
 # velocity up to the cap, N s/m.
 Pushed = tuple[float, float, float, float, float, float, float, float]
 
+Floats = Sequence[float]
+Three = tuple[float, float, float]
+Leg = tuple[int, float, float, float, float]  # index, share, x, y, preload
+
 # Rows of the table of feet; a column is a foot. Values are in world axes unless noted.
 FEET = 27
 (
     PHASE,  # time since touch-down, as a share of the cycle
     OFFSET_X, OFFSET_Y,  # from home, in the body, m
     LIFTED_X, LIFTED_Y,  # place of the lift-off, from home, in the body, m
-    GROUND,  # height of the ground below the foot, m
-    HEIGHT,  # height of the foot above the ground, m
+    GROUND, HEIGHT,  # height of the ground below the foot, and of the foot above it, m
     FRESH, DOME_FILM, SOLE_FILM,  # 1/h² of the film at touch-down, under domes, under sole, 1/m²
     DOME_AREA,  # contact area of the domes, m²
     LOAD, CAP,  # load and tangential capacity, N
     SHEAR_X, SHEAR_Y, SHEAR_TURN,  # shear of the pads, m and rad
     FORCE_X, FORCE_Y, MOMENT,  # force of the ground on the foot, N, and yaw moment, N m
-    SLIP_SPEED,  # m/s
-    SLIP_PATH,  # m
+    SLIP_SPEED, SLIP_PATH,  # m/s, m
     OVERLOAD,  # time with a load above the force limit of the domes, s
     WET,  # 1 on wet ground, 0 on dry
     MARKER_X, MARKER_Y,  # position of the marker, m
@@ -58,15 +60,13 @@ BODY = 16
 ) = range(BODY)  # fmt: skip
 
 
-def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -> bool:
+def step(model: PlanarModel, body: Any, feet: Any, pressures: Floats) -> bool:
     """Advance by a period; return False if the friction step did not converge."""
     dt = model.period
-    before = body[STEPS] * dt - model.settle
-    body[STEPS] += 1.0
     # The gait has its own clock, which starts when the robot has settled.
-    time = body[STEPS] * dt - model.settle
-    before = before if before > 0.0 else 0.0
-    time = time if time > 0.0 else 0.0
+    before = max(0.0, body[STEPS] * dt - model.settle)
+    body[STEPS] += 1.0
+    time = max(0.0, body[STEPS] * dt - model.settle)
     move_feet(model, body, feet, before, time)
     share_loads(model, body, feet)
     # Lever arms and motions are turned into world axes with the heading in mid-step.
@@ -84,11 +84,11 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
         contacts.append((
             0.0, 0.0, body[SLED_X] / dt, body[SLED_Y] / dt, 0.0, 0.0, cap, stiffness * dt
         ))  # fmt: skip
-    mass = model.trunk.mass + towed
     last_x, last_y = body[SPEED_X], body[SPEED_Y]
     free_x = last_x - model.trunk.downhill * dt
     vx, vy, yaw_rate, converged = newton(
-        (free_x, last_y, body[YAW_RATE]), mass, model.trunk.inertia, contacts, dt,
+        (free_x, last_y, body[YAW_RATE]),
+        model.trunk.mass + towed, model.trunk.inertia, contacts, dt,
         (last_x, last_y, body[YAW_RATE]), 0.0,
     )  # fmt: skip
     if not converged:
@@ -108,18 +108,16 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
     return True
 
 
-def walk(
-    model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float], count: int, upright: bool
-) -> bool:
+def walk(model: PlanarModel, body: Any, feet: Any, pressures: Floats, count: int) -> bool:
     """Make ``count`` steps with the same gauge pressures, Pa, or fewer if the walk ends.
 
-    The walk ends at a step that does not converge, and then the result is False. With ``upright``
-    it also ends after the step in which the robot tips over.
+    The walk ends at a step that does not converge, and then the result is False. It also ends
+    after the step in which the robot tips over.
     """
     for _ in range(count):
         if not step(model, body, feet, pressures):
             return False
-        if upright and body[TIPPED] > 0.0:
+        if body[TIPPED] > 0.0:
             break
     return True
 
@@ -224,7 +222,6 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     A gait in which only two feet stand, such as a trot, is in balance on average only. There
     ``rocks`` lets the line between them carry the weight, without the moment about that line.
     """
-    duty = model.gait.duty
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     lift = model.tow.height - model.trunk.height
     lean_x = lift * body[PULL_X] - model.trunk.height * body[PUSH_X]
@@ -239,7 +236,7 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     legs = []
     for index in range(len(model.gait.middles)):
         loads[index] = 0.0
-        share = load_share(duty, model.gait.overlap, phases[index])
+        share = load_share(model.gait.duty, model.gait.overlap, phases[index])
         if share > 0.0:
             x = model.trunk.home_x[index] + offset_x[index]
             y = model.trunk.home_y[index] + offset_y[index]
@@ -265,13 +262,7 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
         body[TIPPED_AT] = body[STEPS] * model.period
 
 
-def balance(
-    legs: Sequence[tuple[int, float, float, float, float]],
-    presses: int,
-    wanted: tuple[float, float, float],
-    rocks: float,
-    loads: Any,
-) -> int:
+def balance(legs: Sequence[Leg], presses: int, wanted: Three, rocks: float, loads: Any) -> int:
     """Set the loads with which the feet in the set ``presses`` balance the robot, 0 for others.
 
     Returns
@@ -325,12 +316,7 @@ def balance(
 
 
 def grip(
-    model: PlanarModel,
-    body: Any,
-    feet: Any,
-    pressures: Sequence[float],
-    cosine: float,
-    sine: float,
+    model: PlanarModel, body: Any, feet: Any, pressures: Floats, cosine: float, sine: float
 ) -> list[Pushed]:
     """Set the tangential capacity of each foot, N; return the contacts of feet that have one.
 
@@ -376,8 +362,7 @@ def dome_load(model: PlanarModel, load: float, pressure: float) -> float:
     if pressure <= 0.0:
         return 0.0
     place = pressure / model.foot.limit_cell
-    table = model.foot.limits
-    last = len(table) - 1
+    table, last = model.foot.limits, len(model.foot.limits) - 1
     if place >= last:
         limit = table[last]
     else:
@@ -390,7 +375,6 @@ def drain(
     model: PlanarModel, feet: Any, index: int, on_domes: float, on_sole: float, pressure: float
 ) -> None:
     """Drain the film under a foot for a period."""
-    dt = model.period
     if on_domes > 0.0:
         area = on_domes / pressure
         fresh = feet[FRESH][index]
@@ -399,11 +383,13 @@ def drain(
             old = feet[DOME_AREA][index] / area
             feet[DOME_FILM][index] = fresh + old * (feet[DOME_FILM][index] - fresh)
         feet[DOME_AREA][index] = area
-        feet[DOME_FILM][index] += model.foot.dome_drain * pressure / area * dt
+        feet[DOME_FILM][index] += model.foot.dome_drain * pressure / area * model.period
     else:
         feet[DOME_AREA][index] = 0.0
     if on_sole > 0.0:
-        feet[SOLE_FILM][index] += model.foot.sole_drain * on_sole / model.foot.sole_area * dt
+        feet[SOLE_FILM][index] += (
+            model.foot.sole_drain * on_sole / model.foot.sole_area * model.period
+        )
 
 
 def resistance(
@@ -416,8 +402,7 @@ def resistance(
 ) -> float:
     """Return the tangential capacity of a foot, N."""
     total = under_domes = 0.0
-    foot = model.foot
-    conforming = foot.conforming_pressure
+    foot, conforming = model.foot, model.foot.conforming_pressure
     if on_domes > 0.0:
         under_domes = on_domes / (pressure if pressure > conforming else conforming)
         dry = foot.friction * on_domes + foot.shear_strength * under_domes
@@ -441,12 +426,12 @@ def on_film(model: PlanarModel, dry: float, load: float, film: float) -> float:
 
 
 def newton(
-    free: tuple[float, float, float],
+    free: Three,
     mass: float,
     inertia: float,
     contacts: Sequence[Pushed],
     dt: float,
-    start: tuple[float, float, float],
+    start: Three,
     creep: float,
 ) -> tuple[float, float, float, bool]:
     """Minimise the convex energy of a step by Newton's method, with a line search by halving.
@@ -501,8 +486,8 @@ def newton(
 
 
 def derivatives(
-    velocity: tuple[float, float, float],
-    free: tuple[float, float, float],
+    velocity: Three,
+    free: Three,
     mass: float,
     inertia: float,
     contacts: Sequence[Pushed],
@@ -577,15 +562,15 @@ def report(model: PlanarModel, body: Any, feet: Any, contacts: list[Pushed]) -> 
     torsional = stiffness * radius * radius
     vx, vy, yaw_rate = body[SPEED_X], body[SPEED_Y], body[YAW_RATE]
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
-    total_x = total_y = 0.0
+    body[PUSH_X] = body[PUSH_Y] = 0.0
     place = 0
     for index in range(len(model.gait.middles)):
         fx = fy = moment = slid = 0.0
         if feet[CAP][index] > 0.0:
             fx, fy, moment, slid, lost = push(vx, vy, yaw_rate, contacts[place], dt)
             place += 1
-            total_x += fx
-            total_y += fy
+            body[PUSH_X] += fx
+            body[PUSH_Y] += fy
             body[LOST] += lost
             feet[SLIP_PATH][index] += slid
         feet[FORCE_X][index], feet[FORCE_Y][index], feet[MOMENT][index] = fx, fy, moment
@@ -596,7 +581,6 @@ def report(model: PlanarModel, body: Any, feet: Any, contacts: list[Pushed]) -> 
         home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
         feet[MARKER_X][index] = body[X] + cosine * home_x - sine * home_y
         feet[MARKER_Y][index] = body[Y] + sine * home_x + cosine * home_y
-    body[PUSH_X], body[PUSH_Y] = total_x, total_y
 
 
 # Functions that `walk` calls; the compiler needs a list of them.

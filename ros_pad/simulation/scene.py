@@ -19,7 +19,7 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Gait, Robot
-from ros_pad.simulation.faults import SENSOR_KINDS, Fault, listed
+from ros_pad.simulation.faults import AIR_KINDS, Fault, listed
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.terrain import FLOORS, Floor, patch_lengths
 
@@ -402,7 +402,7 @@ class Scene:
 
         Faults are texts, as in a ROS parameter. Faults of the sensors of feet are left out.
         """
-        faults = [str(each) for each in self.faults if each.kind not in SENSOR_KINDS]
+        faults = [str(each) for each in self.faults if each.kind in AIR_KINDS]
         return self.regulator | ({'faults': faults} if faults else {})
 
     @property
@@ -531,7 +531,7 @@ def _named(table: Table, key: str, load: Callable[[str], Any]) -> Any:
         name = os.fspath(pathlib.Path(table.origin).parent / name)
     try:
         return load(name)
-    except ConfigError as error:
+    except (ConfigError, InvalidInput) as error:
         raise ConfigError(f'{table.origin}: {key}: {error}') from error
 
 

@@ -58,7 +58,6 @@ LINES = {
     'big chamber': {'pad_volume': 20e-6},
     'small chamber': {'pad_volume': 0.5e-6},
     'slow regulator': {'natural_frequency': 4.0, 'dead_time': 0.1},
-    'slew': {'slew_limit': 3e4},
     'coarse': {'dead_band': 0.01, 'quantum': 500.0},
 }
 

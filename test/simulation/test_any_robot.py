@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots of three to eight legs on L1 and L2, from YAML and URDF."""
 
-import dataclasses
 import math
 import re
 
@@ -220,8 +219,8 @@ def test_robots_from_urdf_that_are_refused(tmp_path, changes, message):
 @pytest.mark.parametrize(
     ('upper', 'lift', 'message'),
     [
-        (0.71, 0.0, r'gait\.stride = 0\.05 m is not allowed: at most 0\.0.*thigh_joint would be'),
-        (0.71, 0.04, r'gait\.lift = 0\.04 m is not allowed: at most 0\.0.*thigh_joint would be'),
+        (0.71, 0.0, r'gait\.stride = 0\.05 m is not allowed.*thigh_joint would be'),
+        (0.71, 0.04, r'gait\.lift = 0\.04 m is not allowed.*thigh_joint would be'),
         (1.5, 0.04, ''),
         (0.0, 0.04, ''),  # as exporters write it that know no limits
     ],
@@ -252,7 +251,10 @@ def test_a_robot_that_stands_beyond_its_limits_may_be_estimated_but_not_walk(tmp
         re.sub('(_shank_joint" type="revolute">)', rf'\1{limit}', text)
     )
     scene = Scene.load(path)
-    with pytest.raises(ConfigError, match=r'robot\.yaml cannot stand at home, .*shank_joint'):
+    with pytest.raises(
+        ConfigError,
+        match=r'gait\.lift = .* of .*robot\.yaml .*shank_joint',
+    ):
         walk(scene, 'L1')
 
 
@@ -265,32 +267,9 @@ def test_what_a_scene_lacks_is_named(tmp_path):
         walk(Scene.load(path), 'L2')
     del robot['gait']
     (tmp_path / 'robot.yaml').write_text(yaml.safe_dump(robot))
-    with pytest.raises(ConfigError, match='its file has no key gait'):
+    with pytest.raises(ConfigError, match='a walk needs a YAML file'):
         Scene.load(path)
     scene = yaml.safe_load(path.read_text()) | {'robot': 'q.urdf'}
     path.write_text(yaml.safe_dump(scene))
-    with pytest.raises(ConfigError, match='needs feet, posture, gait and servos'):
+    with pytest.raises(ConfigError, match='robot: feet = .* 3 to 8 different links'):
         Scene.load(path)
-
-
-def test_errors_of_the_levels_are_not_claimed_for_other_robots():
-    scene = Scene.load('quadruped_patches')
-    assert fidelity.choose(scene).bound < math.inf
-    choice = fidelity.choose(dataclasses.replace(scene, robot='mine'))
-    assert choice.bound == math.inf
-    assert 'robot = mine, drawn were ch3r, go2, rail_leg' in choice.note
-
-
-def test_errors_of_the_levels_are_not_claimed_for_other_gaits(tmp_path):
-    shipped = yaml.safe_load(
-        (configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml').read_text()
-    )
-    path = tmp_path / 'scene.yaml'
-    path.write_text(yaml.safe_dump(shipped))
-    assert fidelity.choose(Scene.load(path)).bound < 1.0
-    gait = {'pushes': False, 'kind': 'own', 'phases': [0.0, 0.5, 0.25, 0.75, 0.1, 0.6]}
-    for change in ({'pushes': False}, gait):
-        path.write_text(yaml.safe_dump(shipped | {'gait': shipped['gait'] | change}))
-        choice = fidelity.choose(Scene.load(path))
-        assert choice.bound == math.inf
-        assert 'phases or pushes of the gait' in choice.note

@@ -30,12 +30,6 @@ def test_advance_is_the_integral_of_speed(time):
     assert GAIT.body_advance(time) == pytest.approx(expected, abs=1e-10)
 
 
-def test_a_stride_a_cycle():
-    for start in (0.0, 0.17, 5.0):
-        advance = GAIT.body_advance(start + 1.2) - GAIT.body_advance(start)
-        assert advance == pytest.approx(0.16)
-
-
 def test_speed_is_zero_where_tripods_change_and_never_negative():
     times = np.linspace(0.0, 1.2, 1201)
     speeds = np.array([body_speed(time) for time in times])
@@ -67,23 +61,6 @@ def test_shares_of_the_two_tripods_make_one(duty):
         ]
         assert all(0.0 <= share <= 1.0 for share in shares)
         assert sum(shares) == pytest.approx(1.0, abs=1e-9)
-
-
-@pytest.mark.parametrize('duty', DUTIES)
-def test_share_comes_and_goes_softly(duty):
-    phases = np.linspace(0.0, 1.0, 20001)
-    shares = np.array([load_share(duty, duty - 0.5, phase) for phase in phases])
-    assert load_share(duty, duty - 0.5, duty) == load_share(duty, duty - 0.5, 0.999) == 0.0
-    steepest = 1.5 / (duty - 0.5)  # slope of the smooth step
-    assert np.abs(np.diff(shares)).max() < 1.01 * steepest * (phases[1] - phases[0])
-
-
-def test_tripods():
-    assert sorted(TRIPODS[0] + TRIPODS[1]) == list(LEGS)
-    for tripod in TRIPODS:
-        assert len({GAIT.phase(leg, 0.37) for leg in tripod}) == 1
-    shift = (GAIT.phase(0, 0.37) - GAIT.phase(1, 0.37)) % 1.0
-    assert shift == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize('duty', DUTIES)
