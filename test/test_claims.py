@@ -7,7 +7,6 @@ import json
 import math
 import pathlib
 import re
-from typing import Any
 
 import pytest
 import yaml
@@ -17,11 +16,11 @@ CLAIMS = yaml.safe_load((ROOT / 'docs' / 'claims.yaml').read_text(encoding='utf-
 WORDS = dict(enumerate(('two', 'three', 'four', 'five', 'six'), start=2)) | {12: 'twelve'}
 
 
-def flat(text: str) -> str:
+def flat(text):
     return ' '.join(text.split())
 
 
-def names() -> dict[str, Any]:
+def names():
     """Return what expressions may use."""
     charts = {
         path.stem: json.loads(path.read_text(encoding='utf-8'))
@@ -36,7 +35,7 @@ def names() -> dict[str, Any]:
     }
 
 
-def shown(claim: dict[str, Any]) -> str:
+def shown(claim):
     """Return the text of a claim with its figures."""
     known = names()
     for name, expression in claim.get('let', {}).items():
@@ -46,7 +45,7 @@ def shown(claim: dict[str, Any]) -> str:
     return flat(claim['text'].format(*values))
 
 
-def unwired(readme: str, claims: dict[str, Any]) -> str:
+def unwired(readme, claims):
     """Return the README without the figures of claims and the texts that are no claims."""
     text = flat(readme)
     for claim in claims['claims']:

@@ -18,7 +18,7 @@ PACKAGE = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
 WORKFLOWS = sorted((ROOT / '.github' / 'workflows').glob('*.yml'))
 
 
-def read(path: pathlib.Path) -> dict:
+def read(path):
     return yaml.safe_load(path.read_text(encoding='utf-8'))
 
 
@@ -50,7 +50,7 @@ def test_hooks_run_what_make_lint_runs():
 
 
 @pytest.mark.parametrize('path', WORKFLOWS, ids=lambda path: path.stem)
-def test_workflows_may_only_read_and_name_major_versions(path: pathlib.Path):
+def test_workflows_may_only_read_and_name_major_versions(path):
     workflow = read(path)
     assert workflow['permissions'] == {'contents': 'read'}
     for job in workflow['jobs'].values():

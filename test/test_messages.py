@@ -13,7 +13,7 @@ ERRORS = {'InvalidInput', 'ConfigError', 'PadError', 'BagError', 'MeshError', 'L
 
 
 @functools.cache
-def raised() -> list[tuple[str, ast.expr]]:
+def raised():
     """Return place and text of each error of ros_pad that is raised with a text."""
     found = []
     for path in sorted(PACKAGE.rglob('*.py')):
@@ -24,7 +24,7 @@ def raised() -> list[tuple[str, ast.expr]]:
     return found
 
 
-def words(text: ast.expr) -> str:
+def words(text):
     """Return a text with {} in place of its values."""
     if isinstance(text, ast.JoinedStr):
         return ''.join(words(part) for part in text.values)

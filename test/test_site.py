@@ -26,7 +26,7 @@ PACKAGES = sorted(page.stem for page in (DOCS / 'api').glob('*.md') if page.stem
 
 
 @pytest.fixture(scope='module')
-def site(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+def site(tmp_path_factory):
     """Return the folder of the site, which `make docs` has built just before."""
     if 'SITE' in os.environ:
         return ROOT / os.environ['SITE']
@@ -37,13 +37,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     return folder
 
 
-def pages(site: pathlib.Path) -> list[pathlib.Path]:
+def pages(site):
     """Return the pages that are made from docs/."""
     return [(site / page.relative_to(DOCS)).with_suffix('.html') for page in DOCS.rglob('*.md')]
 
 
 @pytest.mark.slow
-def test_every_public_name_has_an_entry(site: pathlib.Path):
+def test_every_public_name_has_an_entry(site):
     data = inventory.InventoryFile.loads((site / 'objects.inv').read_bytes(), uri='').data
     entries = {name for kind, names in data.items() if kind.startswith('py:') for name in names}
     for package in PACKAGES:
@@ -53,14 +53,14 @@ def test_every_public_name_has_an_entry(site: pathlib.Path):
 
 
 @pytest.mark.slow
-def test_every_command_is_described(site: pathlib.Path):
+def test_every_command_is_described(site):
     text = (site / 'options.html').read_text(encoding='utf-8')
     for command in cli.COMMANDS:
         assert f'usage: pad {command}' in re.sub('<[^>]*>', '', text)
 
 
 @pytest.mark.slow
-def test_links_lead_to_pages_and_to_files_of_the_repository(site: pathlib.Path):
+def test_links_lead_to_pages_and_to_files_of_the_repository(site):
     package = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
     repository = package.findtext("url[@type='repository']")
     texts = {page: page.read_text(encoding='utf-8') for page in pages(site)}

@@ -11,7 +11,7 @@ from typing import Any
 from ros_pad import contact
 from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.configuration import number
-from ros_pad.contact.dome import ADHESION_SIGNS, MODELS
+from ros_pad.contact.dome import MODELS
 from ros_pad.contact.limits import criteria, largest_pressure
 from ros_pad.contact.thickness import HIGHEST
 from ros_pad.errors import InvalidInput, NoEquilibrium
@@ -53,16 +53,12 @@ def add(commands: Commands) -> None:
     add('--thickness', type=float, metavar='M', help='of a pad of a material, m')
     text = 'how its sheet is held at the rim: the free dome is corrected for thickness'
     add('--edge', choices=tuple(HIGHEST), help=text)
-    text = 'sign between pad and floor (default matlab: the floor attracts); none with a material'
-    add('--adhesion', choices=tuple(ADHESION_SIGNS), help=text)
     add(
         '--model',
         choices=MODELS,
         help='thesis: spherical dome (default); membrane: exact and slower, but the free dome and '
         'the force limits remain those of the spherical dome; pads of a material are membranes',
     )
-    text = "surface tensions of water on silicone (default), or those of the thesis' appendix"
-    add('--liquid', choices=('water', 'thesis'), default='water', help=text)
     add('--json', action='store_true', help='print one JSON object')
 
 
@@ -75,7 +71,6 @@ def run(options: argparse.Namespace) -> int:
         'radius_m': pad.radius,
         'stiffness_n_per_m': pad.stiffness,
         'edge': pad.edge,
-        'adhesion': options.adhesion,
         'model': options.model,
         'pressure_pa': pressure,
         'force_n': force,
@@ -101,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _pad(options: argparse.Namespace) -> contact.Pad:
-    """Return the pad that the options name; set adhesion and model where they were not given."""
+    """Return the pad that the options name; set the model where none was given."""
     if options.material is not None:
         material = contact.Material.load(options.material)
         radius = number('--radius', options.radius, 'm', 1e-4, 1e-2)
@@ -114,15 +109,10 @@ def _pad(options: argparse.Namespace) -> contact.Pad:
         pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
         if options.foot is not None:
             pad = contact.Foot.load(options.foot).pad
-    cap = pad.material is None
-    for key, own in (
-        ('adhesion', 'matlab' if cap else 'none'),
-        ('model', 'thesis' if cap else 'membrane'),
-    ):
-        if getattr(options, key) is None:
-            setattr(options, key, own)
-        elif not cap:
-            raise InvalidInput(f'--{key} is not allowed for a pad of a material')
+    if options.model is None:
+        options.model = 'thesis' if pad.material is None else 'membrane'
+    elif pad.material is not None:
+        raise InvalidInput('--model is not allowed for a pad of a material')
     return pad
 
 
@@ -139,15 +129,14 @@ def _shapes(pad: contact.Pad, options: argparse.Namespace) -> Iterator[tuple[str
     pressure, force = options.pressure, options.force
     free = contact.inflate(pad, pressure)
     yield 'free', values(free, 'height', 'sphere_radius', 'volume')
-    pressed = contact.press(pad, pressure, force, options.adhesion, options.model)
+    adhesion = 'matlab' if pad.material is None else 'none'
+    pressed = contact.press(pad, pressure, force, adhesion, options.model)
     names = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap', 'status')
     yield 'pressed', values(pressed, *names)
     if not force > 0.0:  # the ring around a dome without load is too small to compute
         yield 'meniscus', {'status': 'no_contact'}
         return
-    ring = contact.meniscus(
-        pressed, contact.WATER if options.liquid == 'water' else contact.THESIS_LIQUID
-    )
+    ring = contact.meniscus(pressed, contact.WATER)
     yield 'meniscus', values(ring, 'height', 'ring_radius', 'tangential_force', 'status')
 
 

@@ -218,30 +218,18 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+_UNITS = {
+    **{'load': '_n', 'area': '_m2', 'criterion': '', 'margin': '', 'pads': '', 'pitch': '_m'},
+    **{'load_per_pad': '_n', 'pressure': '_pa', 'ceiling': '_pa', 'pad_limit': '_n'},
+    **{'reachable_load': '_n', 'dome_width': '_m', 'rise_height': '_m', 'pads_needed': ''},
+    **{'pads_without_touching': '', 'carried': '', 'touching': ''},
+}  # of the values of a design, as their JSON names end
+
+
 def values(each: Design) -> dict[str, Any]:
     """Return the values of a design by name with unit; None for values that are not finite."""
-    found = {
-        'load_n': each.load,
-        'area_m2': each.area,
-        'radius_m': each.pad.radius,
-        'stiffness_n_per_m': each.pad.stiffness,
-        'criterion': each.criterion,
-        'margin': each.margin,
-        'pads': each.pads,
-        'pitch_m': each.pitch,
-        'load_per_pad_n': each.load_per_pad,
-        'pressure_pa': each.pressure,
-        'ceiling_pa': each.ceiling,
-        'pad_limit_n': each.pad_limit,
-        'reachable_load_n': each.reachable_load,
-        'dome_width_m': each.dome_width,
-        'rise_height_m': each.rise_height,
-        'pads_needed': each.pads_needed,
-        'pads_without_touching': each.pads_without_touching,
-        'carried': each.carried,
-        'touching': each.touching,
-    }
-    return {name: _finite(value) for name, value in found.items()}
+    pad = {'radius_m': each.pad.radius, 'stiffness_n_per_m': each.pad.stiffness}
+    return pad | {name + unit: _finite(getattr(each, name)) for name, unit in _UNITS.items()}
 
 
 def advice(each: Design) -> Iterator[str]:

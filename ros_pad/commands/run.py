@@ -257,26 +257,19 @@ def alone() -> Iterator[None]:
 
 
 def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path | None) -> dict[str, Any]:
-    own = trial.metrics
+    own, settings = trial.metrics, trial.settings
     assert own is not None
     return {
-        'scene': trial.scene,
-        'policy': trial.policy,
-        'seed': trial.seed,
-        'fidelity': trial.fidelity,
-        'sensing': trial.settings['sensing'],
-        'fidelity_bound': None if own.verdict else trial.settings['fidelity_bound'],
+        **{name: getattr(trial, name) for name in ('scene', 'policy', 'seed', 'fidelity')},
+        'fidelity_bound': None if own.verdict else settings['fidelity_bound'],
         'fidelity_note': labels.promise(trial),
-        'foot': trial.settings['foot'],
-        'faults': trial.settings['faults'],
+        **{name: settings[name] for name in ('sensing', 'foot')},
         **own.as_dict(),
+        # After the metrics, whose faults are those that the controller found.
+        **{name: settings[name] for name in ('learnt', 'omitted', 'taken', 'comparison')},
         'real_time_factor': trial.real_time_factor,
         'bag': str(bag) if bag else None,
         'report': str(page) if page else None,
-        'learnt': trial.settings['learnt'],
-        'omitted': trial.settings['omitted'],
-        'taken': trial.settings['taken'],
-        'comparison': trial.settings['comparison'],
     }
 
 

@@ -18,7 +18,7 @@ pytest.importorskip('argcomplete')
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
-def offered(line: str, folder: pathlib.Path, module: str = 'ros_pad.cli') -> list[str]:
+def offered(line, folder, module='ros_pad.cli'):
     """Return the completions of a line with the cursor at its end, by argcomplete's protocol."""
     answer = folder / '.answer'
     answer.unlink(missing_ok=True)
@@ -41,7 +41,7 @@ def offered(line: str, folder: pathlib.Path, module: str = 'ros_pad.cli') -> lis
     return [word.strip() for word in answer.read_text().split('\n') if word]
 
 
-def test_commands_options_files_and_shipped_names(tmp_path: pathlib.Path):
+def test_commands_options_files_and_shipped_names(tmp_path):
     (tmp_path / 'my_foot.yaml').touch()
     assert set(cli.COMMANDS) <= set(offered('pad ', tmp_path))
     assert offered('python -m ros_pad do', tmp_path, 'ros_pad') == ['doctor']

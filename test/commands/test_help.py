@@ -20,7 +20,7 @@ UNITS = re.compile(
 
 
 @pytest.mark.parametrize('command', cli.COMMANDS)
-def test_examples_parse_and_numbers_have_units(command: str):
+def test_examples_parse_and_numbers_have_units(command):
     # argparse has no public names for the arguments and commands of a parser.
     actions = cli.parser(command)._actions
     (commands,) = (each for each in actions if isinstance(each, argparse._SubParsersAction))

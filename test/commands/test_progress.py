@@ -19,7 +19,7 @@ from ros_pad.commands.progress import bar
 BAG = pathlib.Path(__file__).parents[2] / 'bags' / 'hexapod_patches' / 'bag' / 'bag_0.mcap'
 
 
-def test_what_is_done_is_full_and_what_was_interrupted_stays(capsys: pytest.CaptureFixture[str]):
+def test_what_is_done_is_full_and_what_was_interrupted_stays(capsys):
     with bar('walk', 9.8) as reach:
         reach(9.0)
     with pytest.raises(KeyboardInterrupt), bar('halted', 60.0) as reach:
@@ -29,7 +29,7 @@ def test_what_is_done_is_full_and_what_was_interrupted_stays(capsys: pytest.Capt
     assert 'walk 100%' in said and 'halted  50%' in said and 'halted 100%' not in said
 
 
-def test_a_file_has_few_lines(capsys: pytest.CaptureFixture[str]):
+def test_a_file_has_few_lines(capsys):
     with bar('walk', 1e4) as reach:
         for second in range(10_001):
             reach(second)
@@ -46,13 +46,7 @@ def test_a_file_has_few_lines(capsys: pytest.CaptureFixture[str]):
         (['replay', str(BAG.parent), '--out', 'replayed'], ['replay', 'writing']),
     ],
 )
-def test_long_tasks_report_their_progress(
-    words: list[str],
-    bars: list[str],
-    tmp_path: pathlib.Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-):
+def test_long_tasks_report_their_progress(words, bars, tmp_path, monkeypatch, capsys):
     """Every report is shown: a bar without reports would go from 0 to 100 %."""
     monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
     monkeypatch.setattr(
@@ -69,7 +63,7 @@ def test_long_tasks_report_their_progress(
         assert any(0 < int(share) < 100 for share in shares), said
 
 
-def test_ctrl_c_leaves_the_terminal_clean(tmp_path: pathlib.Path):
+def test_ctrl_c_leaves_the_terminal_clean(tmp_path):
     """The message stands on a line of its own, below the bar; nothing of it is on stdout."""
     words = ['run', 'hexapod_patches', '--no-ros', '--no-compare', '--cycles', '9999', '--json']
     own, other = pty.openpty()

@@ -5,8 +5,6 @@ import html.parser
 import json
 import re
 import resource
-import subprocess
-import sys
 import warnings
 import xml.etree.ElementTree as ElementTree
 
@@ -326,9 +324,6 @@ POOR = {
     'one sample': lambda: dataclasses.replace(
         made_up(), **{name: getattr(made_up(), name)[:1] for name in FAST + SLOW},
     ),
-    'no metrics of wetness': lambda: dataclasses.replace(
-        made_up(), metrics=metrics(0.0, wet_accuracy=None, cycles=0.0)
-    ),
 }  # fmt: skip
 
 
@@ -426,16 +421,3 @@ def test_figures_for_a_paper(tmp_path):
         width, height = each.figure.get_size_inches()
         assert box.x0 > -0.01 and box.y0 > -0.01, name
         assert box.x1 < width + 0.01 and box.y1 < height + 0.01, name
-
-
-@pytest.mark.slow
-def test_no_state_of_pyplot(tmp_path):
-    program = (
-        'import sys, matplotlib\n'
-        'from ros_pad.reports import report\n'
-        'assert "matplotlib.pyplot" not in sys.modules\n'
-    )
-    subprocess.run([sys.executable, '-c', program], check=True, timeout=60)
-    before = dict(matplotlib.rcParams)
-    report.write(made_up(), tmp_path / 'r.html')
-    assert dict(matplotlib.rcParams) == before
