@@ -212,9 +212,7 @@ class Emulator:
     def __enter__(self) -> Emulator:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind:  # the error of the with block is raised, not that of the emulator
-            self._error = None
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def wait(self) -> None:

@@ -167,7 +167,7 @@ def test_links_without_mass_are_refused(tmp_path):
         text = text.replace(f'<mass value="{mass}"/>', '')
     (tmp_path / 'q.urdf').write_text(text)
     path.write_text(path.read_text() + 'body: {mass: 4.0}\n')
-    with pytest.raises(ConfigError, match="the links of robot 'robot' have no mass"):
+    with pytest.raises(ConfigError, match='have 0 of its 0 kg: less than 99%'):
         Scene.load(path)
 
 
