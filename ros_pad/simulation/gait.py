@@ -145,6 +145,8 @@ class FootPath:
         self._homes = homes
         self._reach = gait.reach()
         self._advance = gait.body_advance(0.0)
+        # Legs of one group have one phase: only that of the first of them is computed.
+        self._firsts = [gait.middles.index(each) for each in gait.middles]
         self._offsets: list[tuple[float, float]] = []
         for leg in range(len(homes)):
             phase = gait.phase(leg, 0.0)
@@ -162,7 +164,8 @@ class FootPath:
         """Move the feet to a time of the gait, s, to turn the body by an angle, rad, meanwhile."""
         before, self._advance = self._advance, self._gait.body_advance(time)
         advance = self._advance - before
-        strokes = [self._gait.stroke(leg, time) for leg in range(len(self.feet))]
+        own = {first: self._gait.stroke(first, time) for first in {*self._firsts}}
+        strokes = [own[first] for first in self._firsts]
         offsets, feet, swings = self._offsets, self.feet, self.swings
         self.swings = [stroke is not None for stroke in strokes]
         places = zip(self._homes, offsets, strokes, strict=True)
