@@ -245,8 +245,8 @@ def level(
         return choose(scene, fidelity, policy).level if fidelity == 'auto' else fidelity
     if fidelity not in ('auto', 'L2') or 'L2' not in known:
         raise InvalidInput(
-            f"sensing = 'joints' is not allowed with scene {scene.name!r} and fidelity ="
-            f' {fidelity!r}: it needs fidelity L2, which has joints'
+            f"sensing = 'joints' is not allowed with fidelity = {fidelity!r} of scene"
+            f' {scene.name!r}: it needs fidelity L2, which has joints'
         )
     return 'L2'
 
