@@ -50,13 +50,14 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Answer commands until interrupted; return the exit status."""
-    names = [name.replace('-', '_') for name, _, _ in OPTIONS]
-    given: dict[str, Any] = {
-        name: getattr(options, name) for name in names if getattr(options, name) is not None
-    }
     kind = EMULATORS[options.device]
-    for name in given:
-        choice(f'option of {options.device}', name, [*inspect.signature(kind).parameters])
+    known = [name.replace('_', '-') for name in inspect.signature(kind).parameters]
+    given: dict[str, Any] = {}
+    for name, _, _ in OPTIONS:
+        value = getattr(options, name.replace('-', '_'))
+        if value is not None:
+            choice(f'--{name}: option of {options.device}', name, known)
+            given[name.replace('-', '_')] = value
     with Emulator(kind(schedule=options.fault, **given), options.link) as emulator:
         print(emulator.path, flush=True)
         emulator.wait()

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
+import difflib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-from ros_pad.configuration import nearest
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.regulators.alicat import AlicatRegulator
 from ros_pad.regulators.protocol import Reading, Regulator
@@ -55,15 +55,15 @@ def create(backend: str, **options: Any) -> Regulator:
     """
     if backend not in BACKENDS:
         raise ConfigError(
-            f'there is no regulator backend {backend!r}: the backends are {", ".join(BACKENDS)}'
-            f'{nearest(backend, [*BACKENDS])}'
+            f'there is no regulator backend {backend!r}{_nearest(backend, BACKENDS)}: the backends'
+            f' are {", ".join(BACKENDS)}'
         )
     allowed = inspect.signature(BACKENDS[backend]).parameters
     for name in options:
         if name not in allowed:
             raise ConfigError(
-                f'regulator backend {backend!r} has no option {name!r} (= {options[name]!r}): its'
-                f' options are {", ".join(allowed)}{nearest(name, [*allowed])}'
+                f'regulator backend {backend!r} has no option {name!r} (= {options[name]!r})'
+                f'{_nearest(name, allowed)}: its options are {", ".join(allowed)}'
             )
     missing = [name for name, p in allowed.items() if p.default is p.empty and name not in options]
     if missing:
@@ -72,3 +72,8 @@ def create(backend: str, **options: Any) -> Regulator:
         return BACKENDS[backend](**options)
     except InvalidInput as error:
         raise ConfigError(f'regulator backend {backend!r}: {error}') from error
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(str(name), list(known), n=1)
+    return f' (did you mean {near[0]!r}?)' if near else ''

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import re
 
+from ros_pad.configuration import choice
 from ros_pad.errors import ConfigError, DeviceFault, InvalidInput, ProtocolError
 from ros_pad.regulators.protocol import CEILING
 from ros_pad.regulators.serial_device import Frame, Query, SerialLine, SerialRegulator, unit
@@ -47,6 +48,9 @@ class AlicatRegulator(SerialRegulator):
         9v00 or later they are compared with those of the device; a difference is an error.
     baudrate : int
         1/s, 300 to 4,000,000. Delivered devices have 19200, those of the BC series 38400.
+    set_command : str
+        ``'auto'``: LS with firmware 9v00 or later, S with an older one; or ``'S'``, for a device
+        that rejects LS with a unit.
     ceiling : float
         Highest set-point, gauge Pa, 1 to 1e7.
     reply_timeout, poll_period, silence : float
@@ -79,6 +83,7 @@ class AlicatRegulator(SerialRegulator):
         unit_id: str = 'A',
         units: str = 'kPa',
         baudrate: int = 19200,
+        set_command: str = 'auto',
         ceiling: float = CEILING,
         reply_timeout: float = 0.1,
         poll_period: float = 0.02,
@@ -90,6 +95,7 @@ class AlicatRegulator(SerialRegulator):
             )
         self._unit = unit(units)
         self._units = units
+        self._plain = choice('set_command', set_command, ('auto', 'S')) == 'S'
         self._unit_code = ''  # code of the device's units; empty when S sets the pressure
         self._decimals = 0
         self._held = False
@@ -103,7 +109,8 @@ class AlicatRegulator(SerialRegulator):
         firmware = (int(version[1]), int(version[2])) if version else (0, 0)
         self._unit_code = ''
         if firmware >= UNITS_SINCE:
-            _, self._unit_code = self._setpoint_in(*self._sent(query, 'LS'))
+            _, code = self._setpoint_in(*self._sent(query, 'LS'))
+            self._unit_code = '' if self._plain else code
         if firmware >= SOURCE_SINCE:
             command, reply = self._sent(query, 'LSS')
             if self._words(command, reply)[-1:] == ['A']:
@@ -190,6 +197,7 @@ class AlicatRegulator(SerialRegulator):
         if label.lower() not in (self._units.lower(), f'{self._units}g'.lower()):
             raise ConfigError(
                 f'units = {self._units!r} is not allowed: the device is set to {label}; change'
-                f' this option or the device: command {command!r}, reply {reply!r}'
+                f' this option or the device: port {self._line.port}, command {command!r},'
+                f' reply {reply!r}'
             )
         return float(requested), code

@@ -187,8 +187,6 @@ class Emulator:
         Port to open.
     commands : list of str
         Last received commands, oldest first, at most 1000.
-    ended : threading.Event
-        Set when the emulator has ended.
     """
 
     def __init__(self, device: EmulatedDevice, link: str | None = None) -> None:
@@ -199,27 +197,24 @@ class Emulator:
         self._device = device
         self._link = link
         self._closing = threading.Event()
-        self.ended = threading.Event()
         self._error: Exception | None = None
         self._ends: tuple[int, int] | None = None
         self._buffer = b''
         self.commands: list[str] = []
         self.path = link or ''
         self._plug()
-        self._thread = threading.Thread(target=self._run, name='emulator', daemon=True)
+        self._thread = threading.Thread(target=self._serve, name='emulator', daemon=True)
         self._thread.start()
 
     def __enter__(self) -> Emulator:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind:  # the error of the with block is raised, not that of the emulator
-            self._error = None
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def wait(self) -> None:
         """Wait until the emulator ends because of an error, and raise it."""
-        self.ended.wait()
+        self._closing.wait()
         self.close()
 
     def close(self) -> None:
@@ -259,27 +254,25 @@ class Emulator:
                 os.close(end)
             self._ends = None
 
-    def _run(self) -> None:
+    def _serve(self) -> None:
         try:
-            self._serve()
+            while not self._closing.is_set():
+                self._turn()
         except Exception as error:  # raised by wait() and close()
             self._error = error
-        self.ended.set()
+            self._closing.set()
 
-    def _serve(self) -> None:
-        while not self._closing.is_set():
-            if self._device.faults.act('unplugged'):
-                self._unplug()
-                self._closing.wait(0.005)
-                continue
-            if self._ends is None:
-                self._plug()
-            assert self._ends
-            near = self._ends[0]
-            if not select.select([near], [], [], 0.01)[0]:
-                continue
+    def _turn(self) -> None:
+        if self._device.faults.act('unplugged'):
+            self._unplug()
+            self._closing.wait(0.005)
+            return
+        if self._ends is None:
+            self._plug()
+        assert self._ends
+        near, end = self._ends[0], self._device.terminator.encode()
+        if select.select([near], [], [], 0.01)[0]:
             self._buffer += os.read(near, 4096)
-            end = self._device.terminator.encode()
             while end in self._buffer:
                 line, _, self._buffer = self._buffer.partition(end)
                 self._reply(near, line.decode('ascii', 'replace'))

@@ -229,8 +229,8 @@ def _within(bound: float) -> str:
     percent = 100.0 * bound
     if percent > 99.0:
         return f'off by up to {max(percent, 100.0):.0f} %'
-    unit = 10.0 ** (math.floor(math.log10(max(percent, 1e-3))) - 1)
-    return f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %'
+    digits = 0 if percent > 9.95 else 1
+    return f'within {math.ceil(percent * 10**digits - 1e-9) / 10**digits:g} %'
 
 
 def level(
@@ -244,10 +244,9 @@ def level(
     if not joints:
         return choose(scene, fidelity, policy).level if fidelity == 'auto' else fidelity
     if fidelity not in ('auto', 'L2') or 'L2' not in known:
-        given = f'scene {scene.name!r}' if 'L2' not in known else f'fidelity = {fidelity!r}'
         raise InvalidInput(
-            f"sensing = 'joints' is not allowed with {given}: it needs fidelity L2, which has"
-            ' joints'
+            f"sensing = 'joints' is not allowed with fidelity = {fidelity!r} of scene"
+            f' {scene.name!r}: it needs fidelity L2, which has joints'
         )
     return 'L2'
 

@@ -78,12 +78,11 @@ class PlanarRobot:
     '0.70 m'
     """
 
+    joint_names: tuple[str, ...] = ()
+    joint_positions: tuple[float, ...] = ()
+
     def __init__(
-        self,
-        scene: Scene,
-        floor: Floor,
-        period: float,
-        compile_steps: bool | None = None,
+        self, scene: Scene, floor: Floor, period: float, compile_steps: bool | None = None
     ) -> None:
         instance('scene', scene, Scene)
         instance('scene.body', scene.body, LeggedBody)
@@ -98,8 +97,6 @@ class PlanarRobot:
         self.time = 0.0
         self.dissipation = 0.0
         self.verdict: str | None = None
-        self.joint_names: tuple[str, ...] = ()
-        self.joint_positions: tuple[float, ...] = ()
         self._feet = [FootState() for _ in self.legs]
         self._fresh = False
         self.model = model_of(scene, floor, period)

@@ -10,7 +10,8 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 from ros_pad.configuration import instance, number
@@ -177,20 +178,21 @@ class Hose:
     inner_diameter: float
     length: float
     measured_conductance: float | None = None
-    _law: tuple[float, float, float] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         number('hose_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
         number('hose_length', self.length, 'm', 0.0, 50.0)
         if self.measured_conductance is not None:
             number('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
-        # Laminar mass flow over the difference of squared pressures, kg/(s Pa²)
+
+    @cached_property
+    def _law(self) -> tuple[float, float, float]:
+        """What every step needs, last the laminar flow over the difference of p², kg/(s Pa²)."""
         slope, rt = math.inf, REFERENCE_PRESSURE / REFERENCE_DENSITY
         if self.length:
             drag = 256.0 * AIR_VISCOSITY * self.length * rt
             slope = math.pi * self.inner_diameter**4 / drag
-        law = self.sonic_conductance, self.critical_ratio, slope
-        object.__setattr__(self, '_law', law)  # every step needs it
+        return self.sonic_conductance, self.critical_ratio, slope
 
     @property
     def volume(self) -> float:
@@ -563,20 +565,20 @@ class PneumaticChannel:
         gap' = -relaxation gap - ramp.
         """
         outlet, before = self.outlet.pressure, self.pad_pressure
-        relaxation, share = self._relaxation(start, before, leak)
-        gap = before - share * start
-        ramp = share * (outlet - start) / h
-        done = -math.expm1(-0.5 * relaxation * h)
         middle = 0.5 * (start + outlet)
-        pad = share * middle + gap - (gap + ramp / relaxation) * done
-        relaxation, share = self._relaxation(middle, pad, leak)
-        gap = before - share * start
-        ramp = share * (outlet - start) / h
-        done = -math.expm1(-relaxation * h)
+        drawn, at, pad = start, before, before
+        for time, target in ((0.5 * h, middle), (h, outlet)):
+            at = pad
+            relaxation, share = self._relaxation(drawn, at, leak)
+            gap = before - share * start
+            ramp = share * (outlet - start) / h
+            done = -math.expm1(-relaxation * time)
+            pad = share * target + gap - (gap + ramp / relaxation) * done
+            drawn = middle
         lost = 0.0
         if leak:
-            lost = self._leaking(pad, leak) * pad * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
-        self._fill(share * outlet + gap - (gap + ramp / relaxation) * done, lost)
+            lost = self._leaking(at, leak) * at * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
+        self._fill(pad, lost)
 
     def _hardware(self, during: float, time: float) -> Condition:
         """Return the condition at a time, s, by the faults that act at the time ``during``, s."""

@@ -93,17 +93,12 @@ class LeggedBody:
     @classmethod
     def read(cls, table: Table, robot: Robot) -> LeggedBody:
         """Read the table ``body`` of a scene: what is not as in the robot's file."""
-        if not robot.mass > 0.0:
-            raise ConfigError(
-                f'{table.origin}: the links of robot {robot.name!r} have no mass: give them an'
-                ' <inertial> with <mass>'
-            )
         legs = sum(joint.mass for leg in robot.chains.legs for joint in leg)
-        if robot.mass - legs < LEAST_TRUNK * robot.mass:
+        if not robot.mass - legs > LEAST_TRUNK * robot.mass:
             raise ConfigError(
                 f'{table.origin}: the legs of robot {robot.name!r} have {legs:.4g} of its'
-                f' {robot.mass:.4g} kg: at most {1.0 - LEAST_TRUNK:.0%} is allowed; has its base a'
-                ' mass?'
+                f' {robot.mass:.4g} kg: less than {1.0 - LEAST_TRUNK:.0%} is needed; have base and'
+                ' links an <inertial> with <mass>?'
             )
         mass = table.number('mass', 'kg', 0.05, 2000.0, default=robot.mass)
         inertia, stiffness = robot.inertia * mass / robot.mass, robot.leg_stiffness

@@ -46,7 +46,7 @@ WATCHED = (
 LONGEST = 4096
 """Largest size of an input, bytes; twice the size of the longest seed if that is more."""
 
-REPLY = 256  # largest number of bytes of a reply: ros_pad.regulators.transport.LONGEST_REPLY
+REPLY = 256  # largest number of bytes of a reply: ros_pad.regulators.serial_device.LONGEST_REPLY
 
 
 @contextlib.contextmanager

@@ -66,7 +66,10 @@ def test_a_backend_talks_to_its_emulator(
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        (['smc_itv', '--units', 'kPa'], "option of smc_itv = 'units' is not allowed: one of full"),
+        (
+            ['smc_itv', '--units', 'kPa'],
+            "--units: option of smc_itv = 'units' is not allowed: one of full",
+        ),
         (['alicat', '--fault', 'fire'], "fault = 'fire' is not allowed: one of silence"),
         (['alicat', '--fault', 'silence:5:4'], 'KIND[:START[:END]] is needed'),
         (['alicat', '--unit-ids', 'ab'], "unit_ids = 'ab' is not allowed: [A-Z]+"),

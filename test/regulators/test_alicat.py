@@ -163,6 +163,14 @@ def test_an_old_firmware_receives_no_command_that_locks_its_panel(emulated, open
     assert not [each for each in line.commands if each.startswith('AL')]
 
 
+def test_a_device_that_rejects_units_is_set_without_them(emulated, opened, until):
+    _, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path, set_command='S')
+    regulator.set_pressure(50e3)
+    until(lambda: regulator.read().setpoint == 50e3)
+    assert 'AS50.00' in line.commands
+
+
 @pytest.mark.parametrize(
     ('name', 'value', 'allowed'),
     [

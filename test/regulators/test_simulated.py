@@ -139,19 +139,6 @@ def test_a_day_without_a_reading_takes_few_steps(monkeypatch):
 # --- sensor ------------------------------------------------------------------------------------
 
 
-def test_readings_survive_absolute_pressure_and_back():
-    regulator, clock = opened()
-    regulator.set_pressure(75e3)
-    seen = set()
-    for i in range(200):
-        clock.now = i * 0.0013
-        pressure = regulator.read().pressure
-        assert (pressure + 101325.0) - 101325.0 == pressure
-        assert pressure % 10.0 == 0.0
-        seen.add(pressure)
-    assert len(seen) > 50
-
-
 def test_noise_has_its_size_and_seed_and_leaves_the_pad_alone():
     noisy, clock = opened(sensor_noise=100.0, seed=7, sensor_resolution=1.0)
     again, again_clock = opened(sensor_noise=100.0, seed=7, sensor_resolution=1.0)
@@ -260,7 +247,7 @@ def test_unknown_backend_lists_the_backends():
 
 
 def test_unknown_option_names_the_nearest_and_lists_all():
-    with pytest.raises(ConfigError, match=r"'hose_lenght' \(= 2.0\).*ceiling.*'hose_length'"):
+    with pytest.raises(ConfigError, match=r"'hose_lenght' \(= 2.0\).*'hose_length'.*ceiling"):
         create('simulated', hose_lenght=2.0)
 
 
@@ -286,20 +273,3 @@ def test_bad_option_names_value_and_range(name, value, allowed):
     assert name in message
     assert repr(value) in message
     assert allowed in message
-
-
-def test_options_reach_the_pneumatics():
-    plain, plain_clock = opened()
-    plain.set_pressure(75e3)
-    plain_clock.now = 0.1
-    assert plain.read().pressure > 65e3
-    for options in (
-        {'hose_diameter': 0.001, 'hose_length': 5.0, 'pad_volume': 20e-6},
-        {'hose_conductance': 3e-10},
-        {'natural_frequency': 20.0},
-        {'dead_time': 0.05},
-    ):
-        slow, clock = opened(**options)
-        slow.set_pressure(75e3)
-        clock.now = 0.1
-        assert 0.0 < slow.read().pressure < 0.85 * plain.read().pressure, options

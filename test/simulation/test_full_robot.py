@@ -11,10 +11,9 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from ros_pad.errors import ConfigError, InvalidInput
-from ros_pad.robots import Robot
 from ros_pad.simulation import Scene
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.mujoco_model import POINT, SolverSettings
+from ros_pad.simulation.mujoco_model import SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Tow
 from ros_pad.simulation.terrain import Floor
@@ -115,17 +114,6 @@ def test_missing_mujoco_is_named(monkeypatch):
         FullRobot(scene_of(), DRY, 0.004)
 
 
-@pytest.mark.parametrize(
-    'wrong',
-    [{'timestep': 0.0}, {'timestep': 0.02}, {'integrator': 'RK4'}, {'cone': 'round'},
-     {'impratio': 0.5}, {'impratio': math.nan}, {'noslip_iterations': -1},
-     {'noslip_iterations': 1.5}],
-)  # fmt: skip
-def test_wrong_settings(wrong):
-    with pytest.raises(InvalidInput, match=next(iter(wrong))):
-        SolverSettings(**wrong)
-
-
 # --- statics ----------------------------------------------------------------------------------
 
 
@@ -198,20 +186,6 @@ def test_friction_limit():
     """Under a push of 0.95 μ W the robot stays, under 1.05 μ W it slides."""
     assert creep_of(0.95, 'y', SolverSettings()) < 2e-4
     assert creep_of(1.05, 'y', SolverSettings()) > 0.1
-
-
-def test_torsional_limit():
-    """With torsional friction only, six soles hold a moment of 2/3 R μ W = 0.116 N m."""
-    limit = 2.0 / 3.0 * 0.017 * 0.5 * WEIGHT
-    for share in (0.9, 1.1):
-        robot = standing(0.5)
-        for leg in robot.legs:
-            robot.model.pair(f'foot_{leg}').friction[:2] = 1e-5
-        # The servos hold the trunk relative to the feet. Only torsional friction of the soles
-        # keeps the whole robot from turning.
-        push(robot, yaw=share * limit)
-        mujoco.mj_step(robot.model, robot.data, 500)
-        assert (abs(robot.data.qvel[5]) > 0.2) == (share > 1.0)
 
 
 def test_sliding_and_turning_feet_are_on_the_ellipsoid():
@@ -336,49 +310,6 @@ def test_tow():
     assert sled[-1] - sled[0] == pytest.approx(4 * GAIT.stride, rel=0.05)
 
 
-def test_stiff_lines_take_shorter_steps():
-    """The time step is shortened for stiff lines: at 2 ms 1 MN/m would throw the robot over."""
-    ways = {}
-    for stiffness in (2e3, 1e6):
-        tow = Tow(0.5, 0.5, 0.5, 0.25, 0.03, stiffness)
-        robot = FullRobot(scene_of(tow=tow), DRY, 0.004)
-        ways[stiffness] = advance(robot, 2.5)[0]
-        assert robot.verdict is None
-        reduced = 1.0 / (9.81 / 0.5 + 1.0 / 2.09)
-        assert robot.model.opt.timestep < 2.0 * math.sqrt(reduced / stiffness)
-    assert ways[1e6] == pytest.approx(ways[2e3], rel=0.01)
-    with pytest.raises(ConfigError, match=r'tow.weight = 1e-09 N on a line of .* 2000 N/m needs'):
-        FullRobot(scene_of(tow=Tow(1e-9, 0.5, 0.5, 0.25, 0.03)), DRY, 0.004)
-
-
-def test_steering():
-    robot = FullRobot(scene_of(heading_gain=1.0), DRY, 0.004)
-    robot.data.qpos[3:7] = (math.cos(0.1), 0.0, 0.0, math.sin(0.1))
-    _, _, heading = advance(robot, 0.5 + 2.0)
-    # The heading decays with exp(-gain t) over 2.5 s, also while the robot settles.
-    assert heading == pytest.approx(0.2 * math.exp(-2.5), abs=0.02)
-
-
-def test_uneven_ground():
-    floor = DRY.uneven(2e-3, 3)
-    robot = FullRobot(scene_of(), floor, 0.004)
-    tops = []
-
-    def note():
-        for foot in robot.feet:
-            if foot.force[2] > 3.0:
-                x, y, z = foot.position
-                tops.append((floor.height(x, y), z))
-
-    advance(robot, 0.5 + 3.0, note)
-    heights, places = np.array(tops).T
-    assert np.ptp(heights) > 2e-3
-    # A foot sinks in a little, and near the edge of a cell it may stand on the next cell.
-    assert np.median(np.abs(places - heights)) < 6e-4
-    assert np.corrcoef(heights, places)[0, 1] > 0.8
-    assert robot.verdict is None
-
-
 # --- verdicts ---------------------------------------------------------------------------------
 
 
@@ -445,29 +376,6 @@ def walked(seconds=2.5):
     for _ in range(round(seconds * 250)):
         robot.step(FLAT)
         yield robot.time, robot.proprioception(), robot
-
-
-def test_kinematics_of_the_ch3_r_file_are_those_of_the_simulated_robot():
-    ch3r = Robot.load('ch3r')
-    for time, felt, robot in walked():
-        if time < 2.2:
-            continue
-        assert ch3r.joint_names == robot.joint_names
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, robot.data.qpos[3:7])
-        turn = turn.reshape(3, 3)
-        found = ch3r.kinematics(felt.positions)
-        feet = found.positions @ turn.T + robot.data.qpos[:3]
-        mujoco.mj_kinematics(robot.model, robot.data)  # places of feet at the end of the step
-        first = robot.model.geom('foot_1').id
-        true = robot.data.geom_xpos[first : first + 6] - [0.0, 0.0, POINT]
-        assert np.abs(feet - true).max() < 3e-5  # the ball is upright only at home
-        # Forces are those at the beginning of the last step of 2 ms, in which links turn a little.
-        forces = np.einsum('lij,lj->li', found.rotations, np.array(felt.forces)) @ turn.T
-        for found_force, foot in zip(forces, robot.feet, strict=True):
-            assert found_force == pytest.approx(
-                np.array(foot.force), abs=0.02 + 0.01 * foot.force[2]
-            )
 
 
 def test_gyro_and_accelerometer_integrate_to_the_motion():

@@ -163,23 +163,6 @@ def test_loads_by_trying_every_set_of_feet():
     assert min(seen.values()) > 20
 
 
-def test_three_feet_do_not_feel_the_ground():
-    """Ground heights change the loads of redundant feet only; a tripod's follow from balance."""
-    loads = []
-    for height in (0.0, 5e-3):
-        feet, body = table(), [0.0] * planar_step.BODY
-        feet[planar_step.PHASE] = [0.3, 0.9, 0.3, 0.9, 0.3, 0.9]
-        feet[planar_step.GROUND] = [height, 0.0, 0.0, 0.0, -height, 0.0]
-        planar_step.share_loads(MODEL, body, feet)
-        loads.append(feet[planar_step.LOAD])
-    assert loads[0] == pytest.approx(loads[1], abs=1e-9)
-    # The middle foot balances two corners; the levers are 0.112 m and 0.224 m.
-    half = MODEL.trunk.weight * 0.112 / (0.112 + 0.224)
-    assert loads[0] == pytest.approx(
-        [MODEL.trunk.weight / 3, 0, MODEL.trunk.weight / 3, 0, half, 0]
-    )
-
-
 # --- compiled -----------------------------------------------------------------------------------
 
 
@@ -237,17 +220,3 @@ def test_without_numba_an_extra_is_named(monkeypatch):
     monkeypatch.setitem(__import__('sys').modules, 'numba', None)
     with pytest.raises(ConfigError, match=r'pip install "ros_pad\[fast\]"'):
         compiled.dispatcher.__wrapped__()
-
-
-def test_short_trials_do_not_wait_for_a_compiler(monkeypatch):
-    class Cold:
-        @staticmethod
-        def cache_info():
-            return type('Info', (), {'currsize': 0})
-
-    monkeypatch.setattr(compiled, 'dispatcher', Cold)
-    assert not compiled.worth_loading(SCENE.duration * 250.0)
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: object())
-    assert compiled.worth_loading(1e6)
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
-    assert not compiled.worth_loading(1e6)

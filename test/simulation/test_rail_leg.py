@@ -91,34 +91,6 @@ def test_threshold(cap):
     assert leg.dissipation == pytest.approx(3 * STROKE * cap, rel=1e-2)
 
 
-def test_momentum_and_both_stick():
-    """M dv/dt = force - drag; the drag is F while the body rolls, and at most F at rest."""
-    leg = leg_of(scene_of(0.7))
-    speeds, forces, caps = [0.0], [], []
-    last = [0.0]
-
-    def note():
-        speeds.append((leg.body[0] - last[0]) / leg.period)
-        last[0] = leg.body[0]
-        forces.append(leg.feet[0].force[0])
-        caps.append(leg.feet[0].grip)
-
-    walk(leg, 3.0, note)
-    speeds, forces, caps = map(np.array, (speeds, forces, caps))
-    drag = forces - MASS * np.diff(speeds) / leg.period
-    rolling = np.abs(speeds[1:]) > 1e-12
-    assert rolling.any() and not rolling.all()
-    assert drag[rolling] == pytest.approx(DRAG * np.sign(speeds[1:][rolling]), abs=1e-9)
-    assert np.abs(drag[~rolling]).max() <= DRAG + 1e-9
-    assert (np.abs(forces) <= caps + 1e-9).all()
-    # While the robot settles neither foot nor wheels move.
-    still = leg_of(scene_of(0.7, settle=1.0))
-    walk(still, 0.99)
-    assert still.body == (0.0, 0.0, 0.0)
-    assert still.feet[0].force == (0.0, 0.0, LOAD)
-    assert still.feet[0].standing
-
-
 def test_step_is_the_minimum_of_its_convex_function():
     """A step minimises ½ (v - v0)² + (dt/M) (c |v - u| + F |v|); here by golden section."""
     body = scene_of(1.0).body

@@ -127,22 +127,6 @@ def test_bad_scenes(tmp_path, source, path, value, message):
     assert str(caught.value).startswith(str(file))
 
 
-@pytest.mark.parametrize(
-    'source, path, text, value',
-    [
-        (LEG, 'dome_pressure', '75e3', 75e3),
-        (HEXAPOD, 'tow.weight', '1e1', 10.0),
-        (HEXAPOD, 'floor.film_thickness', '3e-4', 3e-4),
-    ],
-)
-def test_numbers_that_are_text_to_pyyaml(tmp_path, source, path, text, value):
-    file = written(tmp_path, source, (path, text))
-    found = Scene.load(file)
-    for part in path.split('.'):
-        found = getattr(found, part)
-    assert found == value
-
-
 def test_scene_by_path(tmp_path, monkeypatch):
     """A scene has the name of its file; a foot's path is relative to the scene's folder."""
     shutil.copy(configuration.shared_folder() / 'feet/large37.yaml', tmp_path / 'my_foot.yaml')

@@ -4,7 +4,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ros_pad.records import SAMPLE
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.robot import FootState, Proprioception, contacts_of
 from ros_pad.simulation.scene import Scene, SensorNoise
@@ -57,16 +56,6 @@ def test_without_noise_the_truth():
     samples = read(SensorNoise(250.0, 0.0, 0.0), count=3)
     assert (samples[:, 0, 0] == [1.0, -2.0, 7.0]).all()
     assert (samples[:, 1, 1] == [0.1, 0.2, 0.3]).all()
-
-
-def test_a_sample_has_no_velocity_and_keeps_its_values():
-    sensors = Sensors(NOISE, 2, 0)
-    rows = [sensors.sample(Statue()) for _ in range(1001)]
-    copies = [each.copy() for each in rows]
-    sensors.sample(Statue())
-    assert rows[0].dtype == SAMPLE.dtype and rows[0].shape == (2,)
-    assert np.isnan(rows[0]['velocity']).all() and np.isnan(rows[0]['variance']).all()
-    assert [each.tobytes() for each in rows] == [each.tobytes() for each in copies]
 
 
 def test_moments_are_read_where_they_are_measured():

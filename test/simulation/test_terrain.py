@@ -50,18 +50,6 @@ def test_mean_length_of_patches(fraction, length, tolerance):
     assert np.mean(found) == pytest.approx(length, rel=tolerance)
 
 
-def test_floor_repeats_itself_without_a_seam():
-    floor = Floor.patches(0.45, 1.0, FILM, 0)
-    rows, columns = floor.wet_map.shape
-    width, length = rows * floor.cell, columns * floor.cell
-    rng = np.random.default_rng(0)
-    for x, y in rng.uniform(-20.0, 20.0, (500, 2)):
-        assert floor.wet(x, y) == floor.wet(x + length, y) == floor.wet(x, y - width)
-    # At the seam the ground changes no more often than elsewhere.
-    seam = np.mean(floor.wet_map[:, 0] != floor.wet_map[:, -1])
-    assert seam < 0.1
-
-
 def test_cells_are_placed_by_the_origin():
     floor = Floor(np.array([[True, False, False], [False, False, True]]), 0.5, (-1.0, 2.0), FILM)
     assert floor.wet(-0.9, 2.1) and floor.wet(-0.51, 2.49)
@@ -91,16 +79,6 @@ def test_wet_along_is_wet():
 def test_bad_wet_fraction(fraction):
     with pytest.raises(InvalidInput, match='wet_fraction'):
         Floor.patches(fraction, 1.0, FILM, 0)
-
-
-@pytest.mark.parametrize('fraction', [0.1, 0.45, 0.95])
-def test_patch_lengths_that_no_floor_can_show(fraction):
-    shortest, longest = patch_lengths(fraction)
-    for length in (0.99 * shortest, 1.01 * longest, math.nan, 0.0):
-        with pytest.raises(InvalidInput, match=r'patch_length = .* m is needed'):
-            Floor.patches(fraction, length, FILM, 0)
-    for length in (shortest, longest):
-        assert Floor.patches(fraction, length, FILM, 0).wet_map.any()
 
 
 # --- drawn floors -----------------------------------------------------------------------------
