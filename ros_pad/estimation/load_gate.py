@@ -37,8 +37,6 @@ class LoadGate:
         Whether the foot stands.
     """
 
-    __slots__ = ('lift_off', 'standing', 'touch_down')
-
     def __init__(self, expected_load: float, share: float, hysteresis: float = 0.0) -> None:
         self.lift_off = share * expected_load
         self.touch_down = (share + hysteresis) * expected_load

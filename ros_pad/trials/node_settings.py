@@ -16,7 +16,7 @@ from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphol
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
 from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.errors import BagError, ConfigError, InvalidInput, LimitError, reason
+from ros_pad.errors import BagError, InvalidInput, LimitError, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
@@ -144,7 +144,7 @@ class NodeSettings:
         """Return the settings of the nodes of a bag, and defaults for those that it lacks.
 
         They come from the recorded parameters of estimator and controller, as in bags of ros_pad's
-        recorder, or else from the scene that the bag names.
+        recorder.
 
         Parameters
         ----------
@@ -180,21 +180,12 @@ class NodeSettings:
                 f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator or'
                 f' controller is missing or not valid: {reason(error)}'
             ) from error
-        try:
-            scene = Scene.load(about['scene'])
-        except ConfigError:
-            assumed = (
-                f'the bag lacks the parameters of its nodes, and its scene {about["scene"]!r} is'
-                f' not known: foot {settings.foot.source}, policy {settings.policy}, expected_load'
-                f' {settings.expected_load:g} N and the default noise are assumed'
-            )
-            return replace(settings, assumed=(assumed,))
-        return replace(
-            settings,
-            tuning=tuning_for(scene),
-            dome_pressure=scene.dome_pressure or 0.0,
-            legs=tuple(scene.legs),
+        assumed = (
+            f'the bag lacks the parameters of its nodes: foot {settings.foot.source}, policy'
+            f' {settings.policy}, expected_load {settings.expected_load:g} N and the default noise'
+            ' are assumed'
         )
+        return replace(settings, assumed=(assumed,))
 
     def _of_nodes(self, values: dict[str, Any]) -> NodeSettings:
         """Return settings with the recorded parameters of estimator and controller."""

@@ -139,8 +139,8 @@ def test_beliefs_stay_probabilities(samples):
         assert quantiles == sorted(quantiles)
         assert quantiles[0] >= EDGES[0] - 1e-9 and quantiles[-1] <= EDGES[-1] + 1e-9
         # The posterior adds up to 1.
-        assert ground.posterior[0].sum() == pytest.approx(1.0, abs=1e-9)
-        assert ground.posterior[0].min() >= 0.0
+        assert ground.posterior.sum() == pytest.approx(1.0, abs=1e-9)
+        assert ground.posterior.min() >= 0.0
 
 
 @settings(max_examples=60, deadline=None)
