@@ -7,7 +7,7 @@ import pytest
 from ros_pad.contact import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning, doubt
-from ros_pad.estimation.feet import LARGEST_FORCE
+from ros_pad.estimation.foot import LARGEST_FORCE
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.records import PRESSURE, SAMPLE, Block
 
