@@ -13,7 +13,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import pathlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
@@ -155,7 +154,7 @@ class Replay:
 
 
 def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> BagReader:
-    """Open a bag; for an SQLite bag, the error message has the command that converts it.
+    """Open a bag.
 
     Parameters
     ----------
@@ -172,16 +171,8 @@ def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> 
     Raises
     ------
     BagError
-        When :class:`ros_pad.bags.BagReader` raises it, and for an SQLite bag (``.db3``).
+        When :class:`ros_pad.bags.BagReader` raises it.
     """
-    path = pathlib.Path(path)
-    if path.suffix == '.db3' or (path.is_dir() and list(path.glob('*.db3*'))):
-        bag = path.parent if path.suffix == '.db3' else path
-        raise BagError(
-            f'{path}: this is an SQLite bag (.db3), and only MCAP can be read. Convert it:'
-            f' ros2 bag convert -i {bag} -o mcap.yaml, where mcap.yaml has'
-            f" 'output_bags: [{{uri: {bag}_mcap, storage_id: mcap, all: true}}]'"
-        )
     return BagReader(path, progress)
 
 

@@ -472,10 +472,8 @@ def test_without_positions_nothing_is_estimated_which_is_noted(tmp_path):
 
 def test_bags_in_sqlite_are_refused_with_the_way_out(tmp_path):
     bag = copy(tmp_path / 'bag', end=0.1, storage=StoragePlugin.SQLITE3)
-    (file,) = bag.glob('*.db3')
-    for path in (bag, file):
-        with pytest.raises(BagError, match=r'ros2 bag convert -i \S+bag -o mcap.yaml'):
-            open_bag(path)
+    with pytest.raises(BagError, match='ros2 bag convert'):
+        open_bag(bag)
 
 
 @pytest.mark.parametrize(
