@@ -116,14 +116,6 @@ def test_a_dome_cannot_distinguish_the_grounds_and_reports_it(wet):
     assert walk.estimate.friction_mean == pytest.approx(PRIOR.dome, abs=0.1)
 
 
-def test_half_inflated_is_reported():
-    walk = Walk()
-    pressure = next(p for p in range(50_000, 90_000, 100) if FOOT.dome_load(LOAD, p) > 0.4 * LOAD)
-    estimate = walk.stand(0.5, pressure=float(pressure))
-    assert estimate.doubt.startswith('half inflated: domes carry 4')
-    assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
-
-
 @pytest.mark.parametrize('seed', range(2))
 def test_what_turning_hides_a_moment_shows(seed):
     """A slip at T/N = 0.12 is on wet ground, or on dry ground where the foot also turns.
@@ -272,23 +264,6 @@ def test_a_sensor_at_the_end_of_its_range_is_not_used(range_known):
         walk.swing()
     assert estimate.friction_mean == pytest.approx(walk.estimate.friction_mean)
     assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
-
-
-def test_a_sensor_that_dies_is_noticed_in_the_air_too():
-    walk = Broken(lambda *_: ([0.0, 0.0, 0.0], _[1]))
-    walk.stand(0.6)
-    walk.broken = True
-    for _ in range(3):
-        walk.swing()
-        walk.stand()
-    assert walk.estimate.doubt.startswith('force stands still')
-
-
-def test_sensors_configured_without_noise_may_repeat_themselves():
-    estimator = FootEstimator(FOOT, LOAD, Tuning(force_noise=0.0, position_noise=0.0))
-    for k in range(1000):
-        estimate = estimator.update(PERIOD * k, (-2.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0)
-    assert estimate.sound
 
 
 def test_an_old_position_shows_no_slip():
