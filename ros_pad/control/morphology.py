@@ -23,7 +23,6 @@ from ros_pad.control.monitor import PadMonitor, RunningMedian
 from ros_pad.control.policies import DOME, FLAT, Choice, LiftOff, Policy
 from ros_pad.control.pressure import dome_pressure
 from ros_pad.errors import InvalidInput, LimitError
-from ros_pad.estimation.load_gate import LIFT_OFF_SHARE, TOUCH_DOWN, LoadGate
 
 COMMAND_TIMEOUT = Setting(
     'command_timeout', 0.5, 'A pad is vented when it has received no set-point for this long.',
@@ -38,13 +37,51 @@ MARGIN = Setting(
 )  # fmt: skip
 
 LIFT_OFF = Setting(
-    'lift_off_share', LIFT_OFF_SHARE, 'Share of the expected load below which a foot has lifted'
+    'lift_off_share', 0.3, 'Share of the expected load below which a foot has lifted'
     ' off; it stands again at this share plus 0.3.', '', 0.01, 0.6,
 )  # fmt: skip
 
 FIRST_WAIT, LONGEST_WAIT = 5, 40
 """Flat steps after a fault of the air before a dome is tried again; the number doubles with each
 failed try, up to the second one."""
+
+
+TOUCH_DOWN = 0.3
+"""Additional share of the expected load from which on a foot stands again for the controller. So
+noise does not count as steps. Nor does the bounce of a landing foot, which touches the ground with
+up to 0.55 of its load (0.8 on rough ground) and has little load again until the other tripod lifts
+off."""
+
+
+class LoadGate:
+    """Decide from its load whether a foot stands, with hysteresis.
+
+    Parameters
+    ----------
+    expected_load : float
+        Normal force in stance, N, above 0.
+    share : float
+        Share of that load below which a standing foot has lifted off, above 0 up to 1.
+    hysteresis : float
+        Additional share of that load from which on the foot stands again, 0 or more.
+
+    Attributes
+    ----------
+    lift_off, touch_down : float
+        Loads at which the foot lifts off and touches down, N.
+    standing : bool
+        Whether the foot stands.
+    """
+
+    def __init__(self, expected_load: float, share: float, hysteresis: float = 0.0) -> None:
+        self.lift_off = share * expected_load
+        self.touch_down = (share + hysteresis) * expected_load
+        self.standing = False
+
+    def update(self, load: float) -> bool:
+        """Process a load, N; return whether the foot stands."""
+        self.standing = load >= (self.lift_off if self.standing else self.touch_down)
+        return self.standing
 
 
 @dataclass

@@ -4,16 +4,14 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ros_pad.contact.resistance import THICK_FILM, Foot
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel, Posterior
+from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
 from ros_pad.estimation.scales import FrictionPrior, FrictionScales
-from ros_pad.estimation.sensor_faults import DEAD
 from ros_pad.estimation.tuning import Tuning
 
 if TYPE_CHECKING:
@@ -28,15 +26,6 @@ LONGEST_GAP = 0.15
 
 NEW_PLACE = 5e-4
 """Distance over which a sliding foot meets new ground, m."""
-
-LONGEST_STEP = 5.0
-"""Longest time between touch-downs of a walking foot, s: after a longer time its speed is unknown.
-"""
-
-FADING_STEP = 0.02
-"""Least distance by which the posterior fades without measurements, m: more than the jitter of a
-marker.
-"""
 
 
 class Stance:
@@ -75,87 +64,6 @@ class Stance:
         return weight
 
 
-class Path:
-    """Distances that a foot moves between its stances, with which the posterior fades."""
-
-    def __init__(self) -> None:
-        self._footprint: tuple[float, float] | None = None
-        self._touch_down = -math.inf  # time of the last touch-down, s
-        self._speed = 0.0  # mean speed of the foot's steps, m/s
-        self._unseen = 0.0  # distance moved without a marker, not yet returned for fading, m
-
-    def restart(self) -> None:
-        """Discard the time of the last touch-down, because the clock has been set back."""
-        self._touch_down = -math.inf
-
-    def touch_down(self, time: float, x: float, y: float) -> float:
-        """Process a touch-down at a time, s, and place, m; return the distance to fade by, m.
-
-        This is the distance from the last known place, 0 if there is none.
-        """
-        distance = math.dist(self._footprint or (x, y), (x, y))
-        if self._footprint and time - self._touch_down < LONGEST_STEP:
-            self._speed += 0.3 * (distance / (time - self._touch_down) - self._speed)
-        self._footprint, self._touch_down = (x, y), time
-        return distance
-
-    def seen(self, x: float, y: float) -> float:
-        """Process a position, m, without usable force; return the distance to fade by, m."""
-        distance = math.dist(self._footprint, (x, y)) if self._footprint else 0.0
-        if distance > FADING_STEP or self._footprint is None:
-            self._footprint = (x, y)
-        return distance if distance > FADING_STEP else 0.0
-
-    def unseen(self, dt: float) -> float:
-        """Process dt seconds without a usable position; return the distance to fade by, m.
-
-        The foot is assumed to continue at its mean speed.
-        """
-        self._unseen += 0.0 if math.isinf(dt) else self._speed * dt
-        distance, self._footprint = self._unseen, None
-        if distance <= FADING_STEP:
-            return 0.0
-        self._unseen = 0.0
-        return distance
-
-
-class History:
-    """Recent posteriors, kept because a sensor fault is detected only after some time.
-
-    Parameters
-    ----------
-    duration : float
-        Time for which posteriors are kept, s.
-    """
-
-    def __init__(self, duration: float) -> None:
-        self._duration = duration
-        self._entries: deque[tuple[float, Posterior]] = deque()
-
-    def add(self, time: float, posterior: Posterior) -> None:
-        """Add the posterior of a time, s."""
-        entries = self._entries
-        entries.append((time, posterior))
-        while len(entries) > 1 and entries[1][0] <= time - self._duration:
-            entries.popleft()
-
-    def clear(self) -> None:
-        """Discard all posteriors."""
-        self._entries.clear()
-
-    def undo(self, since: float) -> Posterior | None:
-        """Return the last posterior up to a time, s, or the first one if all are later.
-
-        Return None if no posterior is later. Discard all posteriors.
-        """
-        before = [posterior for at, posterior in self._entries if at <= since]
-        found = None
-        if len(before) < len(self._entries):
-            found = (before or [self._entries[0][1]])[-1]
-        self._entries.clear()
-        return found
-
-
 class Ground:
     """What a foot knows of the ground.
 
@@ -189,7 +97,8 @@ class Ground:
     ) -> None:
         self.foot, self.expected_load, self.tuning = foot, expected_load, tuning
         self.filter = GroundFilter(model)
-        self._path, self._history, self._stance = Path(), History(DEAD + LONGEST_GAP), Stance()
+        self._stance = Stance()
+        self._footprint: tuple[float, float] | None = None  # of the last stance, m
         self.belief = (tuning.wet_prior, *self.filter.friction)
         self.quantile = self.filter.quantile(MARGIN_SHARE)
         self.doubt = Doubt(doubt.NOT_YET)
@@ -197,37 +106,18 @@ class Ground:
     def touch_down(self, time: float, x: float, y: float, pressure: float) -> None:
         """Begin a stance at a time, s, and place, m, with a pressure, Pa."""
         self._stance = Stance(self._share_on_domes(pressure))
-        distance = self._path.touch_down(time, x, y)
+        distance = math.dist(self._footprint or (x, y), (x, y))
+        self._footprint = x, y
         self.filter.touch_down(distance, self._stance.dome_share > doubt.DOMED, time)
-        self._history.add(time, self.filter.posterior)
         self.quantile = self.filter.quantile(MARGIN_SHARE)
 
-    def lose(self, dt: float, place: tuple[float, float] | None, since: float, why: Doubt) -> bool:
-        """Undo what the foot has felt since a time, s, as its sensors are in doubt, and fade.
-
-        The sample is dt seconds after the last one, at a place, m, None if that is unknown.
-        Return whether the posterior has changed.
-        """
-        ground, path = self.filter, self._path
-        posterior = self._history.undo(since)
-        if posterior is not None:
-            ground.posterior = posterior
-        distance = path.seen(*place) if place else path.unseen(dt)
-        if distance:
-            ground.fade(distance)
-        changed = posterior is not None or distance > 0.0
-        friction = ground.friction if changed else self.belief[1:]
-        self.belief, self.doubt = (ground.wet_probability, *friction), why
-        return changed
-
-    def set_back(self) -> None:
-        """Forget times, because the clock has been set back."""
-        self._path.restart()
-        self._history.clear()
+    def lose(self) -> None:
+        """Return to the prior, because the sensors are in doubt."""
+        self.filter.reset()
+        self.belief = self.filter.wet_probability, *self.filter.friction
 
     def forget(self, time: float) -> None:
         """Forget what the foot has learnt in wrong axes until a time, s."""
-        self._history.clear()
         self.filter.forget(time)
         self.belief = self.belief[0], *self.filter.friction
 
@@ -261,7 +151,6 @@ class Ground:
         ground, stance = self.filter, self._stance
         self._follow_pressure(time, pressure)
         ground.update(self._evidence(time - window.start, window, place, noises, turning_known))
-        self._history.add(time, ground.posterior)
         self.quantile = ground.quantile(MARGIN_SHARE)
         self.belief = ground.wet_probability, *ground.friction
         self.doubt = doubt.of_ground(

@@ -122,8 +122,6 @@ class SensorFaults:
     ----------
     marker_valid : bool
         Whether the last position can be used.
-    since : float
-        Time at which the last fault began, s; infinite if there was none.
     """
 
     def __init__(self, force_noise: float, position_noise: float, force_range: float) -> None:
@@ -138,7 +136,6 @@ class SensorFaults:
         self._grounded = math.inf
         self._dead = False
         self.marker_valid = True
-        self.since = math.inf
 
     def set_noise(self, force_noise: float, position_noise: float) -> None:
         """Change the standard deviations, N and m; a sensor without noise stays so.
@@ -196,23 +193,21 @@ class SensorFaults:
             self._dead = False
             return None
         if len(stopped) == 3:
-            self.since = max(self._repeats.since[place] for place in stopped)
             if any(force):
                 return Doubt(doubt.STILL, force[2])
-            grounded = time - max(self._grounded, self.since)
+            since = max(self._repeats.since[place] for place in stopped)
+            grounded = time - max(self._grounded, since)
             # A sensor once found dead also counts as dead in the air, until it reads a force.
-            self._dead |= time - self.since > DEAD or grounded > DEAD_ON_GROUND
+            self._dead |= time - since > DEAD or grounded > DEAD_ON_GROUND
             if self._dead:
                 return Doubt(doubt.DEAD)
             return None
         self._dead = False
         for place in range(3):
             if abs(force[place]) >= self._range:
-                self.since = time
                 return Doubt(doubt.RANGE, place, force[place])
             # An axis that a sensor does not have always reads zero.
             if place in stopped and force[place]:
-                self.since = self._repeats.since[place]
                 return Doubt(doubt.STUCK, place, force[place])
         return None
 
@@ -220,12 +215,9 @@ class SensorFaults:
         self, time: float, age: float, stopped: Sequence[int], leap: float, duration: float
     ) -> Doubt | None:
         if age > OLDEST_POSITION:
-            self.since = time - age
             return Doubt(doubt.LOST, age)
         if len(stopped) == 3:
-            self.since = max(self._repeats.since[place] for place in stopped)
             return Doubt(doubt.MARKER_STILL)
         if leap > LEAP_DISTANCE and leap > LEAP * duration:
-            self.since = time
             return Doubt(doubt.LEAPT, 1e3 * leap)
         return None

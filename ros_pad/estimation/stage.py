@@ -17,7 +17,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.feet import (
+from ros_pad.estimation.foot import (
     LARGEST_FORCE,
     LARGEST_POSITION,
     FeetEstimator,

@@ -295,7 +295,7 @@ class Track:
         fault = self._faults.update(time, (fx, fy, fz, x, y, z), age, steady, air)
         if fault:
             self.watch.restart()
-            self._lose(time, dt, x, y, fault)
+            self._lose(time, fault)
             return
         offset, tuning = self._offset, self.ground.tuning
         load, least = fz - offset.z, AIRBORNE_LOAD * self.ground.expected_load
@@ -311,7 +311,7 @@ class Track:
         if time >= self.watch.end:
             self._end_block(time, sample, math.sqrt(variance) if self._joints else None)
         if self.watch.axes.doubt.code:
-            self._lose(time, dt, sample[4], sample[5], self.watch.axes.doubt)
+            self._lose(time, self.watch.axes.doubt)
             return
         if not self.sound:
             self.ground.doubt = Doubt(doubt.NOT_AGAIN)
@@ -342,7 +342,6 @@ class Track:
     def _set_back(self) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
         self.stands, self.time = False, -math.inf
-        self.ground.set_back()
         self._faults.restart()
         self.watch.restart()
         return math.inf
@@ -370,13 +369,15 @@ class Track:
         self.ground.touch_down(time, x, y, pressure)
         self._window = Window(time)
 
-    def _lose(self, time: float, dt: float, x: float, y: float, why: Doubt) -> None:
-        """Undo what has been felt since the sensors are in doubt, and fade."""
-        seen, self.stands = self._faults.marker_valid, False
-        if not seen:
+    def _lose(self, time: float, why: Doubt) -> None:
+        """Use no sample, because the sensors are in doubt."""
+        self.stands = False
+        if not self._faults.marker_valid:
             self._heights.last = math.inf
-        changed = self.ground.lose(dt, (x, y) if seen else None, self._faults.since, why)
-        self.fresh |= changed or self.sound
+        if self.sound:
+            self.ground.lose()
+            self.fresh = True
+        self.ground.doubt = why
         self.sound, self.last, self.slip.sd, self.time = False, None, math.inf, time
 
     def _stand(self, time: float, sample: Sample, pressure: float) -> None:

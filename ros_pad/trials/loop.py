@@ -123,7 +123,6 @@ class ClosedLoop:
     pipeline : Pipeline
         Estimation and decision; see :meth:`connect`.
     supervision : Supervision
-    controller : MorphologyController
     level : str
         Fidelity level.
     pads : list of float
@@ -214,12 +213,16 @@ class ClosedLoop:
         period_ns : int
             Period of estimates, decisions and readings of the regulators, ns.
         """
-        scene, self.controller = self._scene, controller
-        self._pace = Pace(period_ns)
+        scene, self._pace = self._scene, Pace(period_ns)
         estimation = EstimationStage(
             foot or scene.foot, scene.expected_load, self._tuning, scene.legs, period_ns
         )
         self.pipeline = Pipeline(estimation, DecisionStage(controller, scene.legs))
+
+    @property
+    def controller(self) -> MorphologyController:
+        """What decides for all legs."""
+        return self.pipeline.decision.controller
 
     def tick(self, log: TrialLog) -> None:
         """Advance by one sample; at control moments, process the samples since the last one."""

@@ -16,7 +16,7 @@ from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphol
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
 from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.errors import BagError, ConfigError, InvalidInput, LimitError, reason
+from ros_pad.errors import BagError, InvalidInput, LimitError, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
@@ -29,21 +29,19 @@ from ros_pad.trials.label import AMBIENT_PRESSURE, PARAMETERS
 if TYPE_CHECKING:
     from ros_pad.bags import BagReader
 
-OWN = (
-    EXPECTED_LOAD,
-    Setting(
-        'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
-        'Pa', 0.0, 1e6,
-    ),
-    MARGIN,
-    LIFT_OFF,
-    COMMAND_TIMEOUT,
-    AMBIENT_PRESSURE,
-    PUBLISH_RATE,
-)  # fmt: skip
-"""Settings that are single numbers in :class:`NodeSettings`."""
-
-_ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
+KNOWN = {
+    each.name: each
+    for each in (
+        EXPECTED_LOAD,
+        Setting(
+            'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
+            'Pa', 0.0, 1e6,
+        ),
+        MARGIN, LIFT_OFF, COMMAND_TIMEOUT, AMBIENT_PRESSURE, PUBLISH_RATE, *SETTINGS,
+        *POLICY_SETTINGS,
+    )
+}  # fmt: skip
+"""Parameters of estimator and controller that a replay can change, by name."""
 
 SHAKING = 0.3
 """Error of an acceleration as the mean of a sample while the robot walks, m/s²: its steps are
@@ -91,27 +89,12 @@ class NodeSettings:
     Attributes
     ----------
     foot : Foot
-    expected_load : float
-        Load of a foot in stance, N.
-    tuning : Tuning
-        Tuning of the estimators; a yaw moment is used if its noise is above 0.
     policy : str
         ``flat``, ``dome``, ``adaptive`` or ``oracle``.
-    policy_parameters : dict
-        Parameters of the adaptive policy. Other policies have none, but the values are kept for a
-        later change to adaptive.
-    dome_pressure : float
-        Gauge pressure of every dome, Pa; 0 chooses it from the load.
-    margin : float
-        Pressure margin: factor on the load when the pressure of a dome is chosen.
-    lift_off_share : float
-        Share of the expected load below which a foot has lifted off.
-    command_timeout : float
-        Time without a set-point after which a regulator vents its pad, s.
-    ambient_pressure : float
-        Absolute pressure around the robot, Pa.
-    publish_rate : float
-        Rate of the estimates, Hz.
+    values : dict
+        Parameters of both nodes by name, those of :data:`KNOWN`; defaults where they are left out.
+        Policies other than adaptive have no parameters, but their values are kept for a later
+        change to adaptive.
     floor : Floor or None
         True ground, which an oracle needs.
     legs : tuple of int
@@ -121,30 +104,23 @@ class NodeSettings:
     """
 
     foot: Foot
-    expected_load: float
-    tuning: Tuning
     policy: str
-    policy_parameters: dict[str, Any] = field(default_factory=dict)
-    dome_pressure: float = 0.0
-    margin: float = MARGIN.default
-    lift_off_share: float = LIFT_OFF.default
-    command_timeout: float = COMMAND_TIMEOUT.default
-    ambient_pressure: float = AMBIENT_PRESSURE.default
-    publish_rate: float = PUBLISH_RATE.default
+    values: dict[str, Any] = field(default_factory=dict)
     floor: Floor | None = None
     legs: tuple[int, ...] = ()
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for setting in OWN:
-            setting.accept(getattr(self, setting.name))
+        given = self.values
+        values = {n: each.accept(given.get(n, each.default)) for n, each in KNOWN.items()}
+        object.__setattr__(self, 'values', values)
 
     @classmethod
     def of(cls, bag: BagReader) -> NodeSettings:
         """Return the settings of the nodes of a bag, and defaults for those that it lacks.
 
         They come from the recorded parameters of estimator and controller, as in bags of ros_pad's
-        recorder, or else from the scene that the bag names.
+        recorder.
 
         Parameters
         ----------
@@ -159,60 +135,31 @@ class NodeSettings:
             When the foot of the bag is not found.
         """
         about = label.read(bag)
-        known = about['settings']
-        settings = cls(
-            Foot.load(known.get('foot', 'large37')),
-            float(known.get('expected_load', EXPECTED_LOAD.default)),
-            Tuning(),
-            about['policy'] or 'adaptive',
-            ambient_pressure=known['ambient_pressure'],
-            floor=about['floor'],
-        )
+        told = about['settings']
+        foot, policy = told.get('foot', 'large37'), about['policy'] or 'adaptive'
         try:
             nodes = list(json.loads(bag.custom_data.get(PARAMETERS, '{}')).values())
             # Find the nodes by their parameters, because users may rename nodes.
-            found = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
+            estimators = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
             controllers = [each for each in nodes if {'policy', 'margin'} <= each.keys()]
-            if len(found) == len(controllers) == 1:
-                return settings._of_nodes(found[0] | controllers[0])
+            if len(estimators) != 1 or len(controllers) != 1:
+                values = {name: told[name] for name in KNOWN if name in told}
+                assumed = (
+                    f'the bag lacks the parameters of its nodes: foot {foot}, policy {policy},'
+                    f' expected_load {values.get("expected_load", EXPECTED_LOAD.default):g} N and'
+                    ' the default noise are assumed'
+                )
+                return cls(Foot.load(foot), policy, values, about['floor'], assumed=(assumed,))
+            values, floor = told | estimators[0] | controllers[0], about['floor']
+            if floor is None and values.get('scene'):
+                floor = Scene.load(values['scene']).floor.build(int(values.get('seed', 0)))
+            legs = tuple(values['legs'])
+            return cls(Foot.load(values['foot']), str(values['policy']), values, floor, legs)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BagError(
                 f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator or'
                 f' controller is missing or not valid: {reason(error)}'
             ) from error
-        try:
-            scene = Scene.load(about['scene'])
-        except ConfigError:
-            assumed = (
-                f'the bag lacks the parameters of its nodes, and its scene {about["scene"]!r} is'
-                f' not known: foot {settings.foot.source}, policy {settings.policy}, expected_load'
-                f' {settings.expected_load:g} N and the default noise are assumed'
-            )
-            return replace(settings, assumed=(assumed,))
-        return replace(
-            settings,
-            tuning=tuning_for(scene),
-            dome_pressure=scene.dome_pressure or 0.0,
-            legs=tuple(scene.legs),
-        )
-
-    def _of_nodes(self, values: dict[str, Any]) -> NodeSettings:
-        """Return settings with the recorded parameters of estimator and controller."""
-        floor = self.floor
-        if floor is None and values.get('scene'):
-            floor = Scene.load(values['scene']).floor.build(int(values.get('seed', 0)))
-        tuning = {place: values[name] for name, place in _ESTIMATOR.items() if name in values}
-        of_policy = {each.name: values[each.name] for each in POLICY_SETTINGS}
-        return replace(
-            self,
-            **{each.name: values.get(each.name, getattr(self, each.name)) for each in OWN},
-            foot=Foot.load(values['foot']),
-            tuning=Tuning(**tuning),
-            policy=str(values['policy']),
-            policy_parameters={n.removeprefix(PREFIX): value for n, value in of_policy.items()},
-            floor=floor,
-            legs=tuple(values['legs']),
-        )
 
     def changed(
         self,
@@ -236,46 +183,33 @@ class NodeSettings:
         ConfigError, InvalidInput
             When a name or value is not allowed; the message names it, and what is allowed.
         """
-        known = (*(each.name for each in (*OWN, *POLICY_SETTINGS)), *_ESTIMATOR)
-        tuning: dict[str, Any] = {}
-        of_policy: dict[str, Any] = {}
-        changes: dict[str, Any] = {}
-        for name, value in (values or {}).items():
-            choice('parameter', name, known)
-            if name in _ESTIMATOR:
-                tuning[_ESTIMATOR[name]] = value
-            elif name.startswith(PREFIX):
-                of_policy[name.removeprefix(PREFIX)] = value
-            else:
-                changes[name] = value
-        policy = policy or self.policy
+        values = dict(values or {})
+        for name in values:
+            choice('parameter', name, tuple(KNOWN))
         try:
-            if of_policy:
-                policy_named(policy, parameters=of_policy)  # raises unless policy is adaptive
             settings = replace(
                 self,
-                **changes,
                 foot=self.foot if foot is None else Foot.load(foot),
-                tuning=replace(self.tuning, **tuning),
-                policy=policy,
-                policy_parameters=self.policy_parameters | of_policy,
+                policy=policy or self.policy,
+                values=self.values | values,
             )
+            if of_policy := _of_policy(values):
+                policy_named(settings.policy, parameters=of_policy)  # raises unless it is adaptive
             settings.controller(settings.legs or (1,))
         except (InvalidInput, LimitError) as error:
-            given = ', '.join(f'{name}={value}' for name, value in (values or {}).items())
+            given = ', '.join(f'{name}={value}' for name, value in values.items())
             raise InvalidInput(f'{given}: {error}' if given else str(error)) from error
         return settings
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values that :meth:`changed` can change, by the same names."""
-        return (
-            {each.name: getattr(self, each.name) for each in OWN}
-            | {name: getattr(self.tuning, place) for name, place in _ESTIMATOR.items()}
-            | {PREFIX + name: value for name, value in (self._of_policy() or {}).items()}
-        )
+        kept = self.policy == 'adaptive'
+        return {n: each for n, each in self.values.items() if kept or not n.startswith(PREFIX)}
 
-    def _of_policy(self) -> dict[str, Any] | None:
-        return self.policy_parameters if self.policy == 'adaptive' else None
+    @property
+    def tuning(self) -> Tuning:
+        """Tuning of the estimators; a yaw moment is used if its noise is above 0."""
+        return Tuning(**{attribute(each): self.values[each.name] for each in SETTINGS})
 
     def controller(self, legs: Sequence[int]) -> MorphologyController:
         """Return a new controller.
@@ -285,15 +219,21 @@ class NodeSettings:
         legs : sequence of int
             Its legs, from 1.
         """
-        is_wet = self.floor.wet if self.floor else None
+        is_wet, values = self.floor.wet if self.floor else None, self.values
+        parameters = _of_policy(values) if self.policy == 'adaptive' else None
         return MorphologyController(
             self.foot,
             legs,
-            policy_named(self.policy, is_wet, self._of_policy()),
-            self.expected_load,
+            policy_named(self.policy, is_wet, parameters),
+            values['expected_load'],
             start=first_morphologies(self.policy, legs),
-            margin=self.margin,
-            fixed_pressure=self.dome_pressure or None,
-            lift_off_share=self.lift_off_share,
-            command_timeout=self.command_timeout,
+            margin=values['margin'],
+            fixed_pressure=values['dome_pressure'] or None,
+            lift_off_share=values['lift_off_share'],
+            command_timeout=values['command_timeout'],
         )
+
+
+def _of_policy(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of the adaptive policy among those of nodes."""
+    return {n.removeprefix(PREFIX): each for n, each in values.items() if n.startswith(PREFIX)}

@@ -13,7 +13,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import pathlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
@@ -24,7 +23,6 @@ import numpy as np
 from ros_pad.bags import BagReader
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import BagError, InvalidInput
-from ros_pad.estimation.load_gate import CONTACT_SHARE
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.joining import Joiner
 from ros_pad.pace import TICK_PERIOD_NS, Pace, Progress, part
@@ -156,7 +154,7 @@ class Replay:
 
 
 def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> BagReader:
-    """Open a bag; for an SQLite bag, the error message has the command that converts it.
+    """Open a bag.
 
     Parameters
     ----------
@@ -173,16 +171,8 @@ def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> 
     Raises
     ------
     BagError
-        When :class:`ros_pad.bags.BagReader` raises it, and for an SQLite bag (``.db3``).
+        When :class:`ros_pad.bags.BagReader` raises it.
     """
-    path = pathlib.Path(path)
-    if path.suffix == '.db3' or (path.is_dir() and list(path.glob('*.db3*'))):
-        bag = path.parent if path.suffix == '.db3' else path
-        raise BagError(
-            f'{path}: this is an SQLite bag (.db3), and only MCAP can be read. Convert it:'
-            f' ros2 bag convert -i {bag} -o mcap.yaml, where mcap.yaml has'
-            f" 'output_bags: [{{uri: {bag}_mcap, storage_id: mcap, all: true}}]'"
-        )
     return BagReader(path, progress)
 
 
@@ -223,7 +213,9 @@ def replay(
         When a remap is not allowed, see :func:`ros_pad.trials.recorded.read`.
     """
     settings = settings or NodeSettings.of(bag)
-    recording = read(bag, settings.ambient_pressure, namespace, remaps, part(progress, 0.0, 0.2))
+    recording = read(
+        bag, settings.values['ambient_pressure'], namespace, remaps, part(progress, 0.0, 0.2)
+    )
     inputs = _inputs(bag, recording, settings)
     player = _Player(settings, inputs)
     made = player.play(part(progress, 0.2, 0.9))
@@ -278,9 +270,11 @@ def _changes(bag: BagReader) -> Iterator[str]:
 def _outcomes(
     inputs: _Inputs, settings: NodeSettings, recorded: Tracks, replayed: Tracks
 ) -> Iterator[Outcome]:
-    delay_ns = round(2e9 / settings.publish_rate)  # until the estimate of a stance is there
+    values = settings.values
+    gate = values['load_gate'] * values['expected_load']
+    delay_ns = round(2e9 / values['publish_rate'])  # until the estimate of a stance is there
     for place, leg in enumerate(inputs.legs):
-        ends = _stance_ends(inputs, place, CONTACT_SHARE * settings.expected_load) + delay_ns
+        ends = _stance_ends(inputs, place, gate) + delay_ns
         wet, slips, switches = [], [], []
         for tracks in (recorded, replayed):
             wetness, slipping, shape = (
@@ -471,10 +465,10 @@ class _Player:
     def __init__(self, settings: NodeSettings, inputs: _Inputs) -> None:
         self._inputs, legs = inputs, inputs.legs
         self.refused: dict[int, tuple[int, str]] = {}
-        period_ns = round(1e9 / settings.publish_rate)
+        period_ns = round(1e9 / settings.values['publish_rate'])
         self.stages = Pipeline(
             EstimationStage(
-                settings.foot, settings.expected_load, settings.tuning, legs, period_ns,
+                settings.foot, settings.values['expected_load'], settings.tuning, legs, period_ns,
                 self._reject,
             ),
             DecisionStage(settings.controller(legs), legs, self._reject),

@@ -169,16 +169,6 @@ def test_on_wet_ground_a_lone_foot_probes_and_goes_back_to_dome():
     assert {b - a for a, b in itertools.pairwise(probes)} == {3}
 
 
-@pytest.mark.parametrize(('friction', 'last'), [(0.8, 'flat'), (0.41, 'dome'), (math.nan, 'flat')])
-def test_feet_stay_domes_on_dry_ground_where_flat_feet_have_no_more_friction(friction, last):
-    controller = MorphologyController(FOOT, (1,), adaptive(), LOAD)
-    for step in range(12):
-        at = (STRIDE * step, 0.0)
-        controller.update(1, LOAD, 0.03, at, friction)
-        controller.update(1, 0.0, 0.03, at, friction)
-    assert controller.morphology(1) == last
-
-
 def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
     legs = (1, 2, 3, 4, 5, 6)
     walk = Walk(adaptive(), legs=legs, is_wet=lambda x: True)
@@ -192,20 +182,6 @@ def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
     # Six legs together probe hardly more often than one leg alone, every third stride.
     probes = sum(bool(now) and now != before for before, now in itertools.pairwise(settled))
     assert 5 <= probes <= 12
-
-
-def test_the_next_step_is_taken_to_be_as_long_as_the_last():
-    seen = []
-
-    def spy(step):
-        seen.append(step.next_position)
-        return Choice('flat')
-
-    controller = MorphologyController(FOOT, (1,), spy, LOAD)
-    for x, y in ((0.0, 1.0), (0.2, 1.1), (0.3, 1.1)):
-        controller.update(1, LOAD, 0.5, (x, y, 0.0))
-        controller.update(1, 0.0, 0.5, (x, y, 0.0))
-    assert seen == [(0.0, 1.0), pytest.approx((0.4, 1.2)), pytest.approx((0.4, 1.1))]
 
 
 def test_pressure_follows_the_heaviest_recent_step():
@@ -305,12 +281,6 @@ def test_values_that_are_no_numbers_change_nothing(bad, place):
     assert controller.setpoint(1) == 0.0
     # The lift-off was not counted: the next valid sample is the lift-off.
     assert controller.update(1, 0.0, 0.5, (0.0, 0.0)) > 0.0
-
-
-def test_unknown_legs_are_refused():
-    controller = MorphologyController(FOOT, (1, 2), dome, LOAD)
-    with pytest.raises(InvalidInput, match='leg = 3 is not allowed: one of 1, 2'):
-        controller.update(3, LOAD, 0.5, (0.0, 0.0))
 
 
 @pytest.mark.parametrize(

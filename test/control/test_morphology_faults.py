@@ -199,18 +199,6 @@ def test_a_leg_without_estimates_is_flat_and_the_others_go_on():
     assert fault.end - fault.start == pytest.approx(0.5, abs=0.1)
 
 
-def test_a_load_that_reads_zero_leaves_the_foot_as_it_is_and_is_reported():
-    walk = Walk(start='dome')
-    walk.stride(3)
-    walk.weightless.add(1)
-    walk.stride(6)
-    assert walk.controller.fault(1).startswith('no step')
-    assert walk.shapes[-1] == ['dome', 'dome']
-    walk.weightless.clear()
-    walk.stride(2)
-    assert walk.controller.fault(1) == ''
-
-
 def test_too_little_pressure_at_touch_down_is_counted():
     peak = 1.5 * LOAD - 0.1 * 0.5 * LOAD  # initial peak, faded by one step
     need = 75e3 + (peak / 37 - 0.2833) / 1.25e-5

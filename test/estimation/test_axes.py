@@ -118,6 +118,7 @@ def test_what_was_learnt_is_forgotten_when_axes_turn():
     walk = Walk(slip=0.2, ratio=0.35)
     prior = walk.estimator.ground.expected.medians
     for step in range(20):
+        walk._sample(np.zeros(3))
         walk._contact[0] += 0.14
         walk.step(0.2 + 0.7 * step)
     assert walk.estimator.ground.expected.medians.flat_dry < 0.9 * prior.flat_dry

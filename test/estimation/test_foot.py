@@ -55,25 +55,6 @@ class Stance:
 # --- slip ---------------------------------------------------------------------------------------
 
 
-def cyclic_load(stance, amplitude=0.5, cycles=10):
-    """Load and unload the pad tangentially at 2 Hz, without slip; count the alarms raised."""
-    alarms = 0
-    before = False
-    for step in range(cycles * 125):
-        ratio = amplitude * math.sin(math.pi * step / 125) ** 2
-        now = stance.sample(ratio).slipping
-        alarms += now and not before
-        before = now
-    return alarms
-
-
-def test_a_soft_pad_raises_no_alarm_because_its_shear_is_taken_off():
-    soft = dataclasses.replace(FOOT, shear_stiffness=300.0)  # shear up to 11 mm at up to 71 mm/s
-    assert cyclic_load(Stance(soft)) == 0
-    # An estimator that takes the marker for the contact raises an alarm in each cycle.
-    assert cyclic_load(Stance(soft, believed=RIGID)) >= 10
-
-
 @pytest.mark.slow
 def test_the_shipped_foot_raises_no_alarm_in_two_minutes_of_stick():
     stance = Stance()
@@ -104,16 +85,6 @@ def test_a_slip_of_50_mm_a_second_is_detected_within_3_mm(seed):
         stance.sample(0.3, slip=0.05)
     quiet = next(k for k in range(1, 200) if not stance.sample(0.3).slipping) * PERIOD
     assert quiet < 0.1
-
-
-def test_slip_before_lift_off_is_forgotten_at_touch_down():
-    stance = Stance()
-    for _ in range(50):
-        stance.sample(0.3, slip=0.2)
-    assert stance.estimates[-1].slipping
-    stance.sample(0.0, share=0.0)
-    assert not stance.estimates[-1].slipping
-    assert not any(stance.sample(0.3).slipping for _ in range(5))
 
 
 # --- wetness and friction -----------------------------------------------------------------------
@@ -181,19 +152,6 @@ def test_margin_is_the_5_percent_quantile_of_friction_less_the_ratio_now(monkeyp
 
 
 GROUND = 0.5  # m: the floor need not be at zero
-
-
-@pytest.mark.parametrize(
-    ('change', 'wet'),
-    [({'boundary_friction': 0.0}, True), ({'friction': 0.0, 'shear_strength': 0.0}, False)],
-)
-def test_a_foot_without_friction_on_one_ground_slips_there(change, wet):
-    """It slips for half a second at T/N = 0.01, below all friction that an estimate can have."""
-    stance = Stance(dataclasses.replace(FOOT, **change), tuning=Tuning(turning_rate=0.0))
-    for _ in range(125):
-        estimate = stance.sample(0.01, 0.1)
-    assert estimate.friction_mean < 0.06
-    assert (estimate.wet_probability > 0.5) == wet
 
 
 def test_friction_is_given_for_the_load_that_a_foot_stands_under():

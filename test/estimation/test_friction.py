@@ -76,15 +76,6 @@ def test_slip_pulls_friction_to_the_ratio(ratio):
     assert sd < math.hypot(0.06, 0.12 * ratio**2)
 
 
-def test_a_later_slip_wins_over_an_earlier_one():
-    """The ground changes below the sliding foot."""
-    ground = slip(flat(), 0.8, 5, speed=0.2)
-    assert ground.wet_probability < 0.05
-    slip(ground, 0.12, 8, speed=0.2)
-    assert ground.wet_probability > 0.95
-    assert ground.friction[0] == pytest.approx(0.12, abs=0.02)
-
-
 @pytest.mark.parametrize('wet_prior', [0.1, 0.5])
 @pytest.mark.parametrize('speed', [0.0, 0.004])
 def test_low_excitation_shows_nothing(wet_prior, speed):
@@ -112,15 +103,6 @@ stream = st.lists(
 )
 
 
-@pytest.mark.parametrize('sample', [stick, slip])
-def test_quantiles_have_the_mean_and_the_spread_of_friction(sample):
-    ground = sample(flat(), 0.4)
-    draws = [ground.quantile(share) for share in (np.arange(4000) + 0.5) / 4000]
-    mean, sd = ground.friction
-    assert np.mean(draws) == pytest.approx(mean, abs=0.002)
-    assert np.std(draws) == pytest.approx(sd, abs=0.002)
-
-
 @settings(max_examples=60, deadline=None)
 @given(stream)
 def test_beliefs_stay_probabilities(samples):
@@ -139,20 +121,8 @@ def test_beliefs_stay_probabilities(samples):
         assert quantiles == sorted(quantiles)
         assert quantiles[0] >= EDGES[0] - 1e-9 and quantiles[-1] <= EDGES[-1] + 1e-9
         # The posterior adds up to 1.
-        assert ground.posterior[0].sum() == pytest.approx(1.0, abs=1e-9)
-        assert ground.posterior[0].min() >= 0.0
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(-0.5, 0.0)), min_size=1, max_size=40))
-def test_a_dome_that_holds_learns_nothing_of_wetness(samples):
-    ground = slip(flat(), 0.12)
-    before = ground.wet_probability
-    assert before > 0.95
-    ground.touch_down(0.0, dome=True)
-    for ratio, speed in samples:
-        ground.update(Evidence(ratio, 0.03, speed, 0.003, DT))
-    assert ground.wet_probability == pytest.approx(before, abs=1e-9)
+        assert ground.posterior.sum() == pytest.approx(1.0, abs=1e-9)
+        assert ground.posterior.min() >= 0.0
 
 
 def test_a_dome_only_fades_with_the_way_it_steps_and_slides():
@@ -162,17 +132,6 @@ def test_a_dome_only_fades_with_the_way_it_steps_and_slides():
     slip(ground, 0.41, 10, speed=0.05)  # slides 20 mm
     faded = 0.3 + (before - 0.3) * math.exp(-(0.16 + 10 * 0.05 * DT) / 1.5)
     assert ground.wet_probability == pytest.approx(faded, abs=1e-9)
-
-
-def test_forgetting_under_domes_follows_a_film_that_drains():
-    """A dome slips at 0.2, then sticks at 0.4: within half a second the estimate follows. A film
-    that drains in 0.05 s may do so at any moment, so after the slips it is not sure of 0.2."""
-    ground = GroundFilter(GroundModel(FrictionScales(PRIOR)))
-    ground.touch_down(0.0, dome=True)
-    slip(ground, 0.2, 5)
-    assert ground.friction[0] < 0.41 - 0.1
-    stick(ground, 0.4, 12)
-    assert ground.friction[0] > 0.4
 
 
 def test_no_number_of_samples_averages_the_model_error_out(monkeypatch):

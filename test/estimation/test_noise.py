@@ -8,7 +8,6 @@ import pytest
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator, Tuning
-from ros_pad.estimation.noise import SensorNoise
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -68,20 +67,6 @@ def test_noise_with_a_correlation_time_counts_by_its_effect_on_the_slip_speed(ti
     noise = stood(noise, period).noise.position, smoothed(noise, period)
     assert noise[0].white < 0.6 * WHITE  # from sample to sample, most of it is hidden
     assert 0.6 * noise[1] < noise[0].noise < 1.3 * noise[1]
-
-
-@pytest.mark.parametrize(('configured', 'least'), [(0.03, 0.2 / math.sqrt(12.0)), (0.0, 0.0)])
-def test_a_coarse_sensor_of_forces_has_the_noise_of_its_steps(configured, least):
-    noise, generator = SensorNoise(WHITE, configured, LOAD), np.random.default_rng(7)
-    for begin in range(0, 600, 10):  # readings of blocks of 40 ms, under a growing force
-        time = 0.004 * np.arange(begin, begin + 10)
-        forces = time[:, None] * (1.0, 0.5, 1.0) + 2e-3 * generator.normal(size=(10, 3))
-        marker, forces = WHITE * white(10, generator), 0.2 * np.round(forces / 0.2)
-        columns = np.column_stack((time, marker, forces)).T.tolist()
-        noise.add(columns, [*map(np.mean, columns[1:])], 10)
-    assert noise.force.noise >= least
-    assert noise.position.noise == pytest.approx(WHITE, rel=0.2)
-    assert configured or noise.force.noise == 0.0
 
 
 @pytest.mark.parametrize('actual', [3e-4, 6e-4])

@@ -63,15 +63,6 @@ def test_domes_on_wet_ground_hold_less_than_on_dry_and_least_before_the_film_dra
     assert before[abs(np.log(GRID / 0.12)) < 0.05].sum() > 0.9
 
 
-@pytest.mark.parametrize(('friction', 'row'), [(0.0, 1), (0.01, 1), (3.5, 0)])
-def test_friction_beyond_the_grid_is_expected_at_its_end(friction, row):
-    """All but the tail is within two of the larger spreads, 16 %, of the end."""
-    end = 0.025 if friction < 1.0 else 2.5
-    prior = dataclasses.replace(PRIOR, **{CLASSES[row]: friction})
-    expected = FrictionScales(prior).expected(0.0).rows[row]
-    assert expected[abs(np.log(GRID / end)) < 0.32].sum() > 0.9
-
-
 def test_what_a_foot_said_is_taken_back():
     """Two feet disagree; without the first, only the second remains."""
     first = [felt(slip_at(0.4), slip_at(0.4), 0.1 * k, wet=1e-6) for k in range(5)]
@@ -140,13 +131,6 @@ def test_a_period_has_one_expectation_even_for_a_foot_that_is_late():
     assert np.array_equal(shared.expected(9.99).rows, before)
     # After the clock was set back, nothing that was learnt is lost.
     assert np.array_equal(shared.expected(1.0).rows, after)
-
-
-def test_without_learning_the_expectation_stays():
-    shared = FrictionScales(PRIOR, learns=False)
-    before = shared.expected(0.0).rows
-    learnt(shared, [felt(slip_at(0.4), slip_at(0.4))] * 10)
-    assert np.array_equal(shared.expected(2e3).rows, before)
 
 
 def test_feet_learn_from_one_another():

@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact import Foot
-from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning, doubt
-from ros_pad.estimation.feet import LARGEST_FORCE
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.records import PRESSURE, SAMPLE, Block
 
@@ -79,21 +77,6 @@ def test_estimates_are_made_once_a_period_whatever_the_blocks():
     assert [each.last_ns for each in found] == [4 * MS, 20 * MS, 40 * MS]
     assert stage.samples == 14 and stage.used.tolist() == [14, 14]
     assert stage.last_ns == 56 * MS
-
-
-def test_forces_of_refused_samples_count():
-    watched = Watched()
-    watched.sample(4)
-    watched.sample(8)
-    watched.sample(8, 9.0)  # a time stamp twice
-    watched.sample(12, math.inf)
-    watched.sample(16, math.nan)  # no sample at all
-    watched.sample(18, 2 * LARGEST_FORCE)  # is no load of a foot
-    assert [leg for leg, _ in watched.rejected] == [3, 3, 3]
-    assert all(isinstance(error, InvalidInput) for _, error in watched.rejected)
-    watched.sample(20, 6.0)
-    watched.sample(40, 6.0)
-    assert watched.shown('load') == [(4, 6.0), (20, 9.0), (40, 6.0)]
 
 
 def test_a_stamp_that_does_not_advance_is_refused_and_becomes_a_doubt():

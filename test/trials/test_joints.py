@@ -9,13 +9,11 @@ import pytest
 
 pytest.importorskip('mujoco')
 from ros_pad import trials
-from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
-from ros_pad.trials.node_settings import body_settings_for, tuning_for
 from ros_pad.trials.trial import Trial
 
 PATCHES = Scene.load('hexapod_patches')
@@ -28,21 +26,6 @@ def test_the_same_seed_gives_the_same_walk_and_another_one_other_noise():
         assert np.array_equal(getattr(one, series), getattr(same, series)), series
     assert not np.array_equal(one.odom, other.odom)
     assert one.settings['sensing'] == 'joints'
-
-
-def test_settings_of_a_scene():
-    loud = dataclasses.replace(
-        PATCHES, sensors=dataclasses.replace(PATCHES.sensors, gyro=0.02, encoder=1e-3, moment=5e-4)
-    )
-    values = body_settings_for(loud)
-    assert (values['gyro_noise'], values['encoder_noise']) == (0.02, 1e-3)
-    assert values['accelerometer_noise'] == pytest.approx(math.hypot(0.05, 0.3))
-    tuning = tuning_for(loud, 'joints')
-    assert (tuning.source, tuning.pads_shear, tuning.moment_noise) == ('joints', False, 0.0)
-    assert tuning_for(loud).moment_noise == 5e-4
-    assert tuning_for(loud).source == 'markers'
-    with pytest.raises(InvalidInput, match=r"sensing = 'eyes'.*markers, joints"):
-        trials.run(SHORT, sensing='eyes')
 
 
 def test_a_quadruped_is_sensed_by_its_joints():

@@ -88,11 +88,3 @@ def test_a_wrong_file_gets_an_error_that_names_it(file, old, new, words):
     with pytest.raises(ConfigError) as caught:
         learnt.load(file(GOOD.replace(old, new)), 'large37')
     assert 'learnt.yaml' in str(caught.value) and words in str(caught.value)
-
-
-def test_no_file_and_no_place_for_one(tmp_path):
-    with pytest.raises(ConfigError, match='cannot be read'):
-        learnt.load(tmp_path / 'none.yaml', 'large37')
-    with pytest.raises(PadError, match='cannot be written'):
-        learnt.save(tmp_path / 'none' / 'a', learnt.settings_of(
-            shared_friction(FOOT, 6.83, Tuning())), FOOT)  # fmt: skip

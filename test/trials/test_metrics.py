@@ -62,15 +62,6 @@ def test_stances_end_at_the_first_control_step_after_the_last_loaded_sample():
     assert [rows.tolist() for rows in stance_ends(trial, GATE)] == [[2]]
 
 
-def test_a_bounce_ends_no_stance():
-    trial = one_leg([0.5] * 5)
-    fast = dataclasses.replace(trial, time=0.05 * trial.time, slow_time=0.05 * trial.slow_time)
-    # Samples 5 and 6 without load then last 10 ms, too short to end a stance.
-    assert fast.standing(GATE)[:, 0].tolist() == [True] * 9 + [False]
-    assert trial.standing(GATE)[:, 0].tolist() == [load > GATE for load in LOADS[0]]
-    assert [rows.tolist() for rows in stance_ends(fast, GATE)] == [[]]
-
-
 @pytest.mark.parametrize(('at_end', 'expected'), [(0.9, 1.0), (0.1, 0.0), (0.5, 0.0)])
 def test_belief_at_the_end_of_a_stance_against_the_ground_it_stood_on(at_end, expected):
     """The foot stands at 0.5 m, on wet ground; estimates before and after do not matter."""

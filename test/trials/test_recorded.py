@@ -180,13 +180,6 @@ def test_messages_out_of_order_and_without_stamp(tmp_path):
     np.testing.assert_array_equal(trial.force[:, 0, 2], [1.0, 2.0, 3.0])
 
 
-def test_what_the_recorder_missed_is_read(tmp_path):
-    with Recording(tmp_path / 'bag') as bag:
-        bag.add('/leg_1/wrench', wrench(0.0, 0.0, 1.0), 0, 0)
-        bag.writer.describe({'ros_pad_lost': '{"/leg_1/wrench": 3}'})
-    assert recorded.load(tmp_path / 'bag').settings['lost'] == {'/leg_1/wrench': 3}
-
-
 def test_ambient_pressure_comes_from_the_bag(tmp_path):
     with Recording(tmp_path / 'bag', ambient_pressure=95000.0) as bag:
         bag.add('/leg_1/pressure', FluidPressure(fluid_pressure=105000.0), 10 * MS, 10 * MS)
