@@ -255,53 +255,24 @@ def _number(value: float) -> str:
 
 
 def summary(document: dict[str, Any]) -> str:
-    """Return shares, intervals and sharpness as tables in Markdown, the second by group."""
-    lines = [
-        '| robot, level, metric | scenes of the fit | held out | kept | 95 % interval'
-        ' | median error | median bound |',
-        '|---|---|---|---|---|---|---|',
+    """Return shares, intervals and sharpness as text, and the shares of all robots together."""
+    rows = [
+        {'robot': robot, 'level, metric': name, **row}
+        for robot, part in document['robots'].items()
+        for name, row in part['bounds'].items()
+        if row['held_out']
     ]
-    grouped = {}
-    for robot, part in document['robots'].items():
-        for name, row in part['bounds'].items():
-            if not row['held_out'] or name.startswith(FRICTION):
-                continue
-            if name.startswith('L') and name.endswith('distance'):
-                grouped[f'`{robot}` {name.removesuffix(" distance")}'] = row['groups']
-            cells = [
-                f'`{robot}` {name}',
-                str(row['scenes']),
-                str(row['held_out']),
-                _percent(row['kept']),
-                ' to '.join(map(_percent, row['interval'])),
-                _percent(row['median_error']),
-                _percent(row['median_bound']),
-            ]
-            lines.append(f'| {" | ".join(cells)} |')
     for words, levels in (('cheapest level', ('L0', 'L1')), ('L2', ('L2',))):
         for metric in LEAST_SHARES:  # a scene counts once
-            names = [f'{level} {metric}' for level in levels]
             own = [
-                part['bounds'][name]
-                for part in document['robots'].values()
-                for name in names
-                if part['bounds'].get(name, {}).get('held_out')
+                row for row in rows if row['level, metric'] in [f'{x} {metric}' for x in levels]
             ]
             kept = sum(round(row['held_out'] * row['kept']) for row in own)
             count = sum(row['held_out'] for row in own)
-            share = [_percent(each) for each in conformal.interval(kept, count)]
-            lines.append(
-                f'| all, {words} {metric} |  | {count} | {_percent(kept / count)}'
-                f' | {" to ".join(share)} |  |  |'
-            )
-    lines += ['', f'| kept, of | {" | ".join(grouped)} |', '|---' * (1 + len(grouped)) + '|']
-    for group in GROUPS:
-        cells = [
-            f'{_percent(own[group]["kept"])}, {own[group]["held_out"]}' if group in own else '–'
-            for own in grouped.values()
-        ]
-        lines.append(f'| {group} | {" | ".join(cells)} |')
-    return '\n'.join(lines)
+            share = {'held_out': count, 'kept': kept / count if count else None}
+            share['interval'] = conformal.interval(kept, count)
+            rows.append({'robot': 'all', 'level, metric': f'{words} {metric}', **share})
+    return command.listed(rows)
 
 
 def shipped() -> str:

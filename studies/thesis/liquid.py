@@ -57,8 +57,6 @@ _CURVE = tuple(np.linspace(90.0, 0.0, 31))
 _HALF = Liquid(0.004, 0.002)
 _BALANCES = {'energy': '-', 'thesis': (0, (4, 2))}
 _LEVEL = {'energy': (GREEN, '-'), 'force': (BLUE, (0, (1, 1))), 'thesis': (VERMILION, (0, (4, 2)))}
-SECTION, CAPILLARY = '4.2.1', 'capillary.md#what-the-thesis-prints-otherwise'
-ON_DOME = 'On one of its pressed domes; the size of its mesh is not printed.'
 _ALIGNED = 0.15  # relative error up to which heights count as well aligned
 _CONE = (1.6e-3, 1.6e-3 - 2e-3 * math.tan(math.radians(10.0)), 2e-3)
 
@@ -212,19 +210,6 @@ def _one_of_many() -> Mesh:
 
 
 # --- what is drawn -------------------------------------------------------------------------------
-
-_MEASURED = 'Nothing: the thesis computes it and measures none of it.'
-_MODELLED = (
-    'Layers on a mesh (chapter 4): in each slice round the axis the surface is an arc of a '
-    'circle, and its height is in balance. The balance of energy is ours; the balance of the '
-    'thesis is 4.11, summed up from the floor. Both are compared with the exact meniscus of a '
-    'wide bath.'
-)
-_ASSUMED = (
-    'The dome: 75 kPa under 0.19 N, radius 1.5 mm, one of the pressed domes that the thesis '
-    'measured; the thesis shows the size of its mesh only in a picture. The contact angle follows '
-    'from the tensions (3.81). The floor is wet, so the surface meets it at an angle of 0.'
-)
 
 
 def _figure_26() -> Explained:

@@ -134,7 +134,9 @@ def _costs(panel: Axes, rows: Sequence[Row]) -> None:
     for row in best(rows):
         look = _LOOKS[row.name, row.variant]
         missed = 1e2 * (row.misses or 0.0)
-        panel.plot(row.us_per_update, missed, **{'ms': 7.0, **look, 'ls': ''}, clip_on=False)
+        panel.plot(
+            row.us_per_update or math.nan, missed, **{'ms': 7.0, **look, 'ls': ''}, clip_on=False
+        )
     panel.axvline(TARGETS['us_per_update'], **_TARGET)
     panel.set(
         xscale='log', xlim=(0.08, 300.0), xlabel='time of an update, µs',

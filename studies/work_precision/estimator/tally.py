@@ -85,7 +85,7 @@ def replay(walk: Recording) -> Estimates:
             )  # fmt: skip
         out[sample] = found
     flags, values = np.moveaxis(out[..., :3] > 0.5, 2, 0), np.moveaxis(out[..., 3:], 2, 0)
-    return Estimates(*flags, *values, updates=int(walk.arrived.sum()))
+    return Estimates(*flags, *values, int(walk.arrived.sum()))
 
 
 @dataclass

@@ -72,14 +72,11 @@ def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
 def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     """Return the available walkers, and the names of the references and the baseline of times."""
     walkers = []
-    forms = {'L1': (False, False), 'L1, soles turn': (False, True)}
-    if importlib.util.find_spec('numba'):
-        forms['L1, compiled'] = (True, False)
-    for family, (compiled, turning) in forms.items():
-        for step in (1e-3, 4e-3, 1e-2):
-            walkers.append(_planar(family, step, compiled, turning))
+    forms = {'L1': False} | ({'L1, compiled': True} if importlib.util.find_spec('numba') else {})
+    for family, compiled in forms.items():
+        walkers += [_planar(family, step, compiled) for step in (1e-3, 4e-3, 1e-2)]
     if not importlib.util.find_spec('mujoco'):
-        top = _planar('L1', TOP_STEP, False, False)
+        top = _planar('L1', TOP_STEP, False)
         return [*walkers, top], (top.name,), named('L1', SAMPLE)
     steps = (5e-4, 1e-3, 2e-3, 4e-3)
     walkers += [_full('L2', replace(RECOMMENDED, timestep=step)) for step in steps]
@@ -104,10 +101,10 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
 TOP, DRAKE = 'L2, top', 'Drake, force elements'
 
 
-def _planar(family: str, step: float, compiled: bool, turning: bool) -> Walker:
+def _planar(family: str, step: float, compiled: bool) -> Walker:
     def walk(case: Walk) -> Walked:
         floor = case.scene.floor.build(case.seed)
-        robot = PlanarRobot(case.scene, floor, step, compiled, turning)
+        robot = PlanarRobot(case.scene, floor, step, compiled)
         pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / step)
         start = time.process_time()
         for _ in range(count):
@@ -194,8 +191,7 @@ def towing_walkers() -> list[Walker]:
     """Return L1, L2 and Drake, with soles that resist turning and with those that do not."""
     fine = replace(RECOMMENDED, timestep=TOP_STEP)
     return [
-        *(_planar(family, SAMPLE, False, turns)
-          for family, turns in (('L1', False), ('L1, soles turn', True))),
+        _planar('L1', SAMPLE, False),
         _full('L2', fine),
         _full(f'L2, {FREE}', fine, turning=False),
         _drake(2e-4),

@@ -15,7 +15,8 @@ from scipy.optimize import brentq, minimize_scalar
 from ros_pad import configuration
 from ros_pad.errors import ConfigError, NoEquilibrium
 from studies.thesis import bench
-from studies.thesis.bench import CODED, slip_force
+from studies.thesis.bench import CODED
+from studies.thesis.tangential import slip_force
 
 BENCHES = ('inflation', 'press', 'tangential', 'foot')
 
