@@ -226,32 +226,24 @@ def judged(stored: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, 
 
 def text_of(config: dict[str, Any], scenes: dict[str, int]) -> str:
     """Return the text of fidelity.yaml."""
-    lines = [
-        '# Made by python -m studies fidelity. Bound of the error of a level and metric: exp of',
-        '# constant + slopes times features, less 1e-4; at least 1e-4. The promise: the error of',
-        '# 95 of 100 scenes drawn in these ranges is within it.',
-        f'machine: {{{", ".join(f"{key}: {value!r}" for key, value in machine().items())}}}',
-        f'scenes: {{{", ".join(f"{key}: {value}" for key, value in scenes.items())}}}'
-        '  # for fit and calibration',
-        'robots:',
-    ]
+    robots: dict[str, Any] = {}
     for robot, parts in config.items():
-        lines.append(f'  {robot}:')
-        for part, values in parts.items():
-            lines.append(f'    {part}:')
-            for name, row in values.items():
-                if isinstance(row, dict):
-                    slopes = ', '.join(f'{key}: {value:.5g}' for key, value in row.items())
-                    lines.append(f'      {name}: {{{slopes}}}')
-                else:
-                    lines.append(f'      {name}: [{", ".join(map(_number, row))}]')
-    return '\n'.join(lines) + '\n'
-
-
-def _number(value: float) -> str:
-    """Return a number as YAML reads it: with a point before its exponent."""
-    text = repr(float(value))
-    return text if '.' in text else text.replace('e', '.0e')
+        slopes = {
+            name: {key: float(f'{value:.5g}') for key, value in line.items()}
+            for name, line in parts['bounds'].items()
+        }
+        spans = {
+            part: {name: list(map(float, ends)) for name, ends in parts[part].items()}
+            for part in ('ranges', 'features')
+        }
+        robots[robot] = spans | {'bounds': slopes}
+    values = {'machine': machine(), 'scenes': scenes, 'robots': robots}
+    return (
+        '# Made by python -m studies fidelity. Bound of the error of a level and metric: exp of\n'
+        '# constant + slopes times features, less 1e-4; at least 1e-4. The promise: the error of\n'
+        '# 95 of 100 scenes drawn in these ranges is within it. Scenes: of fit and calibration.'
+        f'\n{yaml.safe_dump(values, default_flow_style=None, sort_keys=False, width=1000)}'
+    )
 
 
 def summary(document: dict[str, Any]) -> str:

@@ -299,12 +299,7 @@ def tune(floors: int, cycles: int, processes: int) -> dict[str, Any]:
         row: dict[str, Any] = {'policy': kind, 'settings': list(setting)}
         row['mm_a_cycle'] = round(statistics.fmean(own), 2)
         rows.append(row | {'each_mm': [round(each, 2) for each in own]})
-    return {
-        'grounds': TUNING,
-        'seeds': list(range(floors)),
-        'cycles': cycles,
-        'tried': rows,
-    }
+    return {'grounds': TUNING, 'seeds': list(range(floors)), 'cycles': cycles, 'tried': rows}
 
 
 # --- tables --------------------------------------------------------------------------------------

@@ -230,11 +230,7 @@ def _figure_26() -> Explained:
         )
         figure.text(k / 3.0 + 0.015, 0.93, f'({"abc"[k]}) {name}')
         figure.text(k / 3.0 + 0.015, 0.04, f'{heights} mm', fontsize=7.0)
-    return explained(
-        26,
-        figure,
-        _claims_26(),
-    )
+    return explained(26, figure, _claims_26())
 
 
 def _claims_26() -> tuple[Claim, ...]:
@@ -271,10 +267,7 @@ def _figure_27() -> Explained:
     left.plot(np.degrees(turns), [1e6 * found.section(a) for a in turns], color=BLUE)
     twin = left.twinx()
     twin.plot(
-        np.degrees(turns),
-        [1e6 * found.force(a) for a in turns],
-        color=VERMILION,
-        ls=(0, (4, 2)),
+        np.degrees(turns), [1e6 * found.force(a) for a in turns], color=VERMILION, ls=(0, (4, 2))
     )
     twin.spines['right'].set_visible(True)
     twin.set_ylim(None, 0.0)
@@ -294,11 +287,7 @@ def _figure_27() -> Explained:
     right.axvline(0.0, color=BLACK, lw=0.7)
     right.set_xlabel('force along the motion / µN')
     right.set_title('(b) dome')
-    return explained(
-        27,
-        figure,
-        _claims_27(readings),
-    )
+    return explained(27, figure, _claims_27(readings))
 
 
 class _Readings(NamedTuple):
@@ -384,11 +373,7 @@ def _figure_28() -> Explained:
     ]
     legend(figure, handles)
     curve = climbed(tension, 'energy')[1]
-    return explained(
-        28,
-        figure,
-        _claims_28(layers, truths, curve),
-    )
+    return explained(28, figure, _claims_28(layers, truths, curve))
 
 
 def _claims_28(layers: list[float], truths: list[float], curve: Array) -> tuple[Claim, ...]:
@@ -429,11 +414,7 @@ def _figure_29() -> Explained:
     ax.set_xlabel('tension of the solid / (mN/m)')
     ax.set_ylabel('wetted height / mm')
     legend(figure, _handles(), 3)
-    return explained(
-        29,
-        figure,
-        _claims_29(),
-    )
+    return explained(29, figure, _claims_29())
 
 
 def _claims_29() -> tuple[Claim, ...]:
@@ -494,11 +475,7 @@ def _figure_30() -> Explained:
     ax.set_xlabel('wetted height / mm')
     ax.set_ylabel('radius of curvature / mm')
     legend(figure, _handles(), 3)
-    return explained(
-        30,
-        figure,
-        _claims_30(),
-    )
+    return explained(30, figure, _claims_30())
 
 
 def _claims_30() -> tuple[Claim, ...]:
@@ -552,11 +529,7 @@ def _figure_31() -> Explained:
         )
     ax.set(xlabel='distance of neighbours / mm', ylabel='height / mm', ylim=(0.0, 2.2))
     ax.legend(loc='upper right', ncols=2, fontsize=7.0)
-    return explained(
-        31,
-        figure,
-        _claims_31(true, limit),
-    )
+    return explained(31, figure, _claims_31(true, limit))
 
 
 def _claims_31(true: list[float], limit: float) -> tuple[Claim, ...]:

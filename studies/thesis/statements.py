@@ -236,12 +236,7 @@ def _feet() -> tuple[Claim, ...]:
             (carried, robot),
             None,
         ),
-        claim(
-            'at high pressure the',
-            'Soles are rigid here.',
-            (),
-            None,
-        ),
+        claim('at high pressure the', 'Soles are rigid here.', (), None),
     )
 
 

@@ -384,10 +384,7 @@ def failure_maps(size: int = 54, progress: Progress | None = None) -> list[Failu
     """
     methods: list[tuple[str, Callable[[float, float], float]]] = [
         ('mpmath, as vpasolve', _pressed_mpmath),
-        (
-            'fsolve, start at 0.1 and 1 mm',
-            lambda p, f: _pressed_fsolve(p, f, Start(1e-4, 1e-3)),
-        ),
+        ('fsolve, start at 0.1 and 1 mm', lambda p, f: _pressed_fsolve(p, f, Start(1e-4, 1e-3))),
         ('brentq, one unknown', _pressed_brentq),
         ('press', lambda p, f: press(PAD, p, f).height),
     ]

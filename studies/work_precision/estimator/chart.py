@@ -59,8 +59,7 @@ def draw_methods(rows: Sequence[Row]) -> Figure:
         c.set_yscale('symlog', linthresh=0.3, linscale=0.4)
         c.set_ylim(-0.05, 130.0)
         c.set_yticks(
-            [0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
-            ['0', '0.3', '1', '3', '10', '30', '100'],
+            [0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0], ['0', '0.3', '1', '3', '10', '30', '100']
         )
         _costs(d, rows)
         handles = [

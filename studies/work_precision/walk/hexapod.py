@@ -86,10 +86,7 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     ]
     baseline = named('L2', RECOMMENDED.timestep)
     if importlib.util.find_spec('pydrake'):
-        tops: tuple[Walker, ...] = (
-            _full(TOP, replace(RECOMMENDED, timestep=1e-4)),
-            _drake(1e-4),
-        )
+        tops: tuple[Walker, ...] = (_full(TOP, replace(RECOMMENDED, timestep=1e-4)), _drake(1e-4))
         walkers += [_drake(step) for step in (2e-4, 4e-4)]
     else:
         # The finer one shows the uncertainty of the reference.

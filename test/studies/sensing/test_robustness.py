@@ -11,10 +11,7 @@ from ros_pad.robots import Chains, Robot
 from ros_pad.sensing import BodyEstimator
 from studies.sensing import walks
 
-SENSORS = (
-    *('gyro', 'accelerometer'),
-    *('joint_positions', 'joint_velocities', 'foot_forces'),
-)
+SENSORS = (*('gyro', 'accelerometer'), *('joint_positions', 'joint_velocities', 'foot_forces'))
 GO2 = Robot.load('go2')
 
 
@@ -115,10 +112,7 @@ def test_a_delay_is_found_and_can_be_given(walked, delay):
     assert abs(estimator.delay[0]) < 1.5e-3
 
 
-@pytest.mark.parametrize(
-    ('name', 'doubt'),
-    [('gyro', 'imu'), ('joint_positions', 'joints')],
-)
+@pytest.mark.parametrize(('name', 'doubt'), [('gyro', 'imu'), ('joint_positions', 'joints')])
 def test_a_sensor_that_repeats_is_in_doubt_until_it_lives_again(log, name, doubt):
     values = getattr(log, name)
     values[1500:1900] = values[1499]

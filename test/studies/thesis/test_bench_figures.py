@@ -91,11 +91,7 @@ def test_measured_points_lie_on_the_curves_figure():
 
 @pytest.mark.parametrize(
     'name, axes, values',
-    [
-        (17, 0, (1.8, 1.4, 1.0)),
-        (18, 0, (0.5, 0.98, 1.1)),
-        (18, 1, (0.084434, 0.36217, 0.4368)),
-    ],
+    [(17, 0, (1.8, 1.4, 1.0)), (18, 0, (0.5, 0.98, 1.1)), (18, 1, (0.084434, 0.36217, 0.4368))],
 )
 def test_pressed_points_stand_at_both_forces(name, axes, values):
     for open_, forces in ((False, (0.08, 0.19, 0.285)), (True, (0.1, 0.2, 0.3))):
