@@ -155,25 +155,6 @@ def test_a_long_gap_is_in_doubt_and_then_recovered(log):
     assert rms(error[-500:]) < 0.012
 
 
-@pytest.mark.parametrize(('jump', 'kind'), [(10.0, 'gap'), (-3.0, 'clock')])
-def test_clocks_that_jump(log, jump, kind):
-    log.time[1500:] += jump
-    found, _, _ = run(log)
-    assert found[1500].doubt.startswith(kind)
-    assert found[-1].doubt == ''
-    # Estimation begins anew with another heading, so speeds are compared.
-    speeds = np.array([np.linalg.norm(each.velocity[:2]) for each in found[-500:]])
-    assert rms(speeds - np.linalg.norm(log.velocity[-500:, :2], axis=1)) < 0.015
-
-
-def test_start_while_walking(log):
-    found, _, _ = run(log, chosen=range(1300, len(log.time)))
-    assert found[0].doubt.startswith('start: ')
-    assert found[-1].doubt == ''
-    speeds = np.array([np.linalg.norm(each.velocity[:2]) for each in found[-1000:]])
-    assert rms(speeds - np.linalg.norm(log.velocity[-1000:, :2], axis=1)) < 0.012
-
-
 def test_long_pushes_on_ice_are_within_the_stated_deviation():
     pytest.importorskip('mujoco')
     log = walks.walk(walks.COURSES['long pushes, ice'], 6, 14.0)

@@ -187,13 +187,11 @@ def generator():
 
 
 def test_messages(plain):
-    assert np.flatnonzero(conditions.rate(plain, 50.0, generator()).arrived[:, 0])[
-        :3
-    ].tolist() == [*(0, 5, 10)]
+    slow = conditions.rate(plain, 50.0, generator())
+    assert np.flatnonzero(slow.arrived[:, 0])[:3].tolist() == [0, 5, 10]
     late = conditions.late_position(plain, 0.02, generator()).position
     assert (late[5:] == plain.position[:-5]).all()
-    found = tally.replay(conditions.rate(plain, 50.0, generator()))
-    assert found.updates == 6 * 200
+    assert tally.replay(slow).updates == 6 * 200
 
 
 # --- the study ----------------------------------------------------------------------------------
@@ -285,6 +283,3 @@ def test_table_and_pictures(rows, tmp_path):
     for name, figure in pictures.items():
         figure.savefig(tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 20_000
-
-
-# --- pictures and tables ------------------------------------------------------------------------

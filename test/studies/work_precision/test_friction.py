@@ -176,41 +176,6 @@ def test_exact_stick_reports_when_it_gives_up():
 
 # --- forces -----------------------------------------------------------------------------------
 
-TRIANGLE = ((0.2, 0.1), (-0.2, 0.1), (0.0, -0.2))
-
-
-def test_three_sticking_feet_have_one_twist_and_forces_by_stiffness():
-    """A slow push of 0.6 N on feet of 1, 2 and 3 kN/m: six forces and three equations.
-
-    By hand, springs at levers r are sheared by one displacement (x, y, φ). Their forces add up to
-    the push and their moments to zero, which is a linear system of three equations.
-    """
-    stiffness = np.array([1000.0, 2000.0, 3000.0])
-    levers = np.array(TRIANGLE)
-    # Displacement of foot i is B_i (x, y, φ).
-    maps = [np.array([[1.0, 0.0, -ry], [0.0, 1.0, rx]]) for rx, ry in levers]
-    total = sum(k * b.T @ b for k, b in zip(stiffness, maps, strict=True))
-    displaced = np.linalg.solve(total, [0.6, 0.0, 0.0])
-    expected = np.array([-k * b @ displaced for k, b in zip(stiffness, maps, strict=True)])
-
-    feet = [contact(5.0, r, stiffness=k) for r, k in zip(TRIANGLE, stiffness, strict=True)]
-    twist = STILL
-    for _ in range(2000):
-        free = (twist[0] + 0.6 / MASS * 0.004, twist[1], twist[2])
-        twist = elastic(free, MASS, INERTIA, feet, 0.004, twist)
-    assert max(map(abs, twist)) < 1e-9
-    assert np.array([(f.force_x, f.force_y) for f in feet]) == pytest.approx(expected, abs=1e-6)
-
-    # Rigid feet do not move either, with the least forces that balance push and moment.
-    rigid = [contact(5.0, r) for r in TRIANGLE]
-    still = exact_stick((0.6 / MASS * 0.004, 0.0, 0.0), MASS, INERTIA, rigid, 0.004)
-    assert distance(still, STILL) < 1e-8
-    balance = np.hstack([b.T for b in maps])
-    least = np.linalg.pinv(balance) @ [-0.6, 0.0, 0.0]
-    found = [value for f in rigid for value in (f.force_x, f.force_y)]
-    assert found == pytest.approx(least, abs=1e-4)
-    assert np.abs(np.array(found) - expected.ravel()).max() > 0.02  # another split
-
 
 @pytest.mark.parametrize('name', STEPS)
 def test_newton_and_euler_laws(name):
