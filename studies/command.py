@@ -23,7 +23,6 @@ from ros_pad.commands.progress import bar
 from ros_pad.reports.files import save
 from ros_pad.reports.style import rendered
 from studies.machine import machine
-from studies.work_precision import comparison
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CHARTS = ROOT / 'docs' / 'charts'
@@ -159,6 +158,23 @@ def write(
     return kept
 
 
+def listed(rows: Sequence[Mapping[str, Any]], title: str = '') -> str:
+    """Return rows as a table in text, numbers with four digits."""
+
+    def word(value: Any) -> str:
+        if isinstance(value, Mapping):
+            return ', '.join(f'{key} {word(each)}' for key, each in value.items())
+        if isinstance(value, (list, tuple)):
+            return ' '.join(map(word, value)) if len(value) <= 6 else f'{len(value)} values'
+        return f'{value:.4g}' if isinstance(value, float) else '-' if value is None else str(value)
+
+    names = [*{name: None for row in rows for name in row}]
+    lines = [names, *([word(row[name]) if name in row else '' for name in names] for row in rows)]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(names))]
+    shown = ('  '.join(map(str.ljust, line, widths)).rstrip() for line in lines)
+    return '\n'.join(filter(None, (title, *shown)))
+
+
 def show(options: argparse.Namespace, document: Any, table: str) -> None:
     """Print the JSON if ``--json`` was given, else the table."""
     print(json.dumps(document, indent=1, ensure_ascii=False) if options.json else table)
@@ -198,6 +214,6 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
     if options.json:
         print(json.dumps(rows))
         return 0
-    print(getattr(study, 'table', comparison.table)(results))
+    print(study.table(results) if hasattr(study, 'table') else listed(rows))
     print(f'table and pictures: {folder}')
     return 0

@@ -243,8 +243,8 @@ def read(path: pathlib.Path) -> Recording:
             f'{path}: 13 columns of finite numbers are needed, the last one (labels'
             f' {np.unique(table[:, 12])}) 0, 1 or 2'
         )
-    parts = np.split(table[:, :12], 4, axis=1)
-    found = Recording(path.stem, *parts, table[:, 12].astype(int))
+    force, moment, acceleration, rate = np.split(table[:, :12], 4, axis=1)
+    found = Recording(path.stem, force, moment, acceleration, rate, table[:, 12].astype(int))
     if not (np.any(found.load > 0.0) and found.slipping.any() and found.sticking.any()):
         raise InvalidInput(
             f'{path} has no stable contact or no slip in stance (force z above {GATE:g} of the'
@@ -592,25 +592,17 @@ def alarm_figures(
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return labels, ranking, alarms and probabilities as text, a line for each figure."""
-    lines = []
-    for recording, parts in document['recordings'].items():
-        lines += ['', recording]
-        lines += [f'  {name:28} {value}' for name, value in parts['labels'].items()]
-        for name, row in parts['ranking'].items():
-            low, high = row['interval']
-            lines.append(
-                f'  AUC of {name:28} {row["auc"]:.3f} ({low:.3f} to {high:.3f}),'
-                f' pairs of one stance {row["within_stance"]:.3f}'
-            )
-        for part, keys in (
-            ('alarm', ('missed', 'delay_s', 'false_per_minute')),
-            ('calibration', ('brier', 'accuracy')),
-        ):
-            for name, row in parts[part].items():
-                cells = [f'{key} {row[word][key]}' for word in ('own', 'other') for key in keys]
-                lines.append(f'  {part} by {name:22} own, other: {", ".join(cells)}')
-    return '\n'.join(lines[1:])
+    """Return labels, ranking, alarms and probabilities as text."""
+    found = document['recordings']
+    lines = [command.listed([{'file': name, **row['labels']} for name, row in found.items()])]
+    for part in ('ranking', 'alarm', 'calibration'):
+        rows = [
+            {'file': name, part: score, **row}
+            for name, parts in found.items()
+            for score, row in parts[part].items()
+        ]
+        lines.append(command.listed(rows))
+    return '\n\n'.join(lines)
 
 
 COLOURS = (SKY, BLUE, GREEN, ORANGE, VERMILION, PURPLE, BLACK)

@@ -261,24 +261,17 @@ def run(folder: pathlib.Path) -> dict[str, Any]:
 
 def table(document: dict[str, Any]) -> str:
     """Return ranking and alarms on ATLAS, and what the stances of the Go1 show, as text."""
-    lines = []
-    for name, row in document['atlas'].items():
-        lines.append(f'{name}: {row["labels"]}')
-        for score, found in row['ranking'].items():
-            low, high = found['interval']
-            lines.append(f'  AUC of {score:22} {found["auc"]:.2f} ({low:.2f} to {high:.2f})')
-        for alarm, found in row['alarm'].items():
-            low, high = (100.0 * share for share in found['missed_interval'])
-            lines.append(
-                f'  {alarm:35} missed {100.0 * found["missed"]:.0f} % of {found["events"]}'
-                f' ({low:.0f} to {high:.0f} %), delay {found["delay_s"]} s,'
-                f' {found["false_per_minute"]:.0f} false a minute'
-            )
-    for name, row in document['go1']['ground'].items():
-        lines.append(f'Go1, {name}: {row}')
-    for key, found in document['go1']['auc'].items():
-        lines.append(f'AUC of greased by {key}, with its interval: {found}')
-    return '\n'.join(lines)
+    lines = [command.listed([{'file': k, **r['labels']} for k, r in document['atlas'].items()])]
+    for part in ('ranking', 'alarm'):
+        rows = [
+            {'file': name, part: score, **found}
+            for name, row in document['atlas'].items()
+            for score, found in row[part].items()
+        ]
+        lines.append(command.listed(rows))
+    for part in ('ground', 'auc'):
+        lines.append(command.listed([{part: k, **r} for k, r in document['go1'][part].items()]))
+    return '\n\n'.join(lines)
 
 
 def main(words: Sequence[str]) -> int:

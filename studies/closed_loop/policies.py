@@ -2,7 +2,7 @@
 """Compare the adaptive policy with fixed shapes, rivals of the literature and the oracle.
 
 Walks variants of ``hexapod_patches`` with full dynamics (L2). Everything was tuned on the tuning
-grounds (``--tune``, in a walk without dynamics, at most nine settings a policy) and is compared on
+grounds (``--tune``, at most nine settings a policy) and is compared on
 grounds that differ from them in a condition: patch length, wet share, film, towed load,
 friction of the feet. Then on grounds where adapting cannot win, or where the foot's file is
 wrong, and with fixed shapes at slower gaits. Every gain has a 95 % bootstrap interval over floors.
@@ -31,7 +31,7 @@ from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.closed_loop import loops, quick_walk, rivals
+from studies.closed_loop import loops, rivals
 from studies.drawing import BLACK, BLUE, GREEN, STYLE
 
 BETTER = 'better fixed shape'
@@ -283,34 +283,23 @@ def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
 
 def _tuning_walk(kind: str, settings: tuple[Any, ...], name: str, seed: int, cycles: int) -> float:
     scene, _ = ground(name, cycles)
-    if kind == 'adaptive':
-        policy = adaptive(probe_below=settings[0])
-    elif kind == 'oracle':
-        policy = policy_named(kind, scene.floor.build(seed).wet)
-    else:
-        policy = rival(kind, settings)
-    return quick_walk.walk(scene, policy, 'oracle' if kind == 'oracle' else 'adaptive', seed)
+    policy = adaptive(probe_below=settings[0]) if kind == 'adaptive' else rival(kind, settings)
+    return _walk(scene, None, policy, 'adaptive', seed).robot.body[0] / cycles
 
 
 def tune(floors: int, cycles: int, processes: int) -> dict[str, Any]:
     """Return the mean distance of every setting on the tuning grounds."""
     tried = [(kind, setting) for kind, settings in SETTINGS.items() for setting in settings]
-    tried.append(('oracle', ()))
     places = [(name, seed) for name in TUNING for seed in range(floors)]
     cases = [(*one, *place, cycles) for one in tried for place in places]
     walked = command.in_processes(_tuning_walk, cases, processes, 'tuning')
     rows = []
     for index, (kind, setting) in enumerate(tried):
         own = [1e3 * each for each in walked[index * len(places) : (index + 1) * len(places)]]
-        row = {'policy': kind, 'settings': list(setting)}
+        row: dict[str, Any] = {'policy': kind, 'settings': list(setting)}
         row['mm_a_cycle'] = round(statistics.fmean(own), 2)
         rows.append(row | {'each_mm': [round(each, 2) for each in own]})
-    return {
-        'grounds': TUNING,
-        'seeds': list(range(floors)),
-        'cycles': cycles,
-        'tried': rows,
-    }
+    return {'grounds': TUNING, 'seeds': list(range(floors)), 'cycles': cycles, 'tried': rows}
 
 
 # --- tables --------------------------------------------------------------------------------------

@@ -184,17 +184,12 @@ def measure(options: argparse.Namespace, folder: pathlib.Path) -> Result:
 
 
 def table(result: Result) -> str:
-    """Return the medians as text, those of the other checkout and their ratio beside them."""
-    lines = []
-    for part, rows in result.items():
-        heads = [*rows, *(('ratio',) if 'before' in rows else ())]
-        lines.append(f'{part:32}' + ''.join(f'{head:>10}' for head in heads))
-        for key, now in rows['now'].items():
-            values = [row[key] for row in rows.values()]
-            if 'before' in rows:
-                values.append(now / values[0])
-            lines.append(f'  {key:30}' + ''.join(f'{value:10.4g}' for value in values))
-    return '\n'.join(lines)
+    """Return the medians as text."""
+    return command.listed([
+        {'part': part, 'checkout': name, **row}
+        for part, rows in result.items()
+        for name, row in rows.items()
+    ])  # fmt: skip
 
 
 def chart(rows: dict[str, dict[str, float]]) -> Figure:

@@ -274,21 +274,6 @@ def run(
     return result
 
 
-def table(results: Sequence[Result]) -> str:
-    """Return the results as text."""
-    lines = [
-        'flood       records/s  vent after (s)  flooded pad  pressures/s  diagnostics/s'
-        '  growth (MB)  processor'
-    ]
-    for each in results:
-        lines.append(
-            f'{each.kind:8} {each.rate:12.0f} {each.reaction:15.3f}'
-            f'  {"up" if each.flooded_up else "vented":>11} {each.pressures:12.1f}'
-            f' {each.diagnostics:14.1f} {each.growth:12.1f} {each.processor:9.0%}'
-        )
-    return '\n'.join(lines)
-
-
 def main(words: Sequence[str]) -> int:
     """Flood with every kind; return the exit status."""
     parser = command.parser('flood', __doc__)
@@ -307,7 +292,8 @@ def main(words: Sequence[str]) -> int:
     for kind in options.kinds:
         with bar(f'flood: {kind}', options.rounds, 'round') as reach:
             results.append(run(kind, options.rounds, options.rate, reach))
-    command.show(options, [dataclasses.asdict(each) for each in results], table(results))
+    kept = [dataclasses.asdict(each) for each in results]
+    command.show(options, kept, command.listed(kept))
     late = [each.kind for each in results if each.reaction > TIMEOUT + LATEST]
     if late:
         print(

@@ -334,19 +334,20 @@ def run(target: str, repeats: int, work: float, seed: int = 0) -> Iterator[Try]:
 
 
 def table(tries: Sequence[Try]) -> str:
-    """Return the results as text."""
-    lines = [
-        'target      tries  good  status 0  bag or pressure  Python starts (s)  longest end (s)'
-    ]
+    """Return the results as text, a line for each target."""
+    rows = []
     for target in dict.fromkeys(one.target for one in tries):
         own = [one for one in tries if one.target == target]
-        good = sum(not one.problems for one in own)
-        lines.append(
-            f'{target:10} {len(own):6} {good:5} {sum(0 in one.statuses for one in own):9}'
-            f' {sum(one.reached for one in own):16}'
-            f' {max(one.python for one in own):18.2f} {max(one.ending for one in own):16.2f}'
-        )
-    return '\n'.join(lines)
+        rows.append({
+            'target': target,
+            'tries': len(own),
+            'good': sum(not one.problems for one in own),
+            'status 0': sum(0 in one.statuses for one in own),
+            'bag or pressure': sum(one.reached for one in own),
+            'Python starts (s)': max(one.python for one in own),
+            'longest end (s)': max(one.ending for one in own),
+        })  # fmt: skip
+    return command.listed(rows)
 
 
 def _perform_all(target: str, repeats: int, seed: int, tries: list[Try]) -> None:

@@ -249,19 +249,6 @@ def _at(at: Array, time: Array, columns: Array) -> Array:
     return np.stack([np.interp(at, time, column) for column in columns.T], axis=1)
 
 
-def table(rows: Sequence[Row]) -> str:
-    """Return the figures as text, a line for each method on each recording."""
-    return '\n'.join(
-        f'{row.recording:6} {row.method:14} position {1e3 * row.position_error:.0f} mm of'
-        f' {row.path:.2f} m, velocity {1e3 * row.velocity_error:.1f} mm/s, in 2 sd'
-        f' {row.coverage:.2f}; slip {1e3 * row.slip_median:.1f} mm/s, 95 %'
-        f' {1e3 * row.slip_most:.1f}, in 2 sd {row.slip_coverage:.2f}; flagged'
-        f' {1e2 * row.flagged:.1f} %, {row.alarms / row.minutes:.1f} alarms a minute, in doubt'
-        f' {1e2 * row.doubt:.1f} %'
-        for row in rows
-    )
-
-
 def main(words: Sequence[str]) -> int:
     """Measure, and print the table; return the exit status."""
     part = command.parser('foreign', __doc__)
@@ -280,5 +267,6 @@ def main(words: Sequence[str]) -> int:
         raise InvalidInput(f'a folder is needed: {sources}')
     found = [read(folder) for read, folder in folders]
     rows = [row for each in command.each(found, 'foreign', 'robot') for row in measure(each)]
-    command.show(options, [dataclasses.asdict(row) for row in rows], table(rows))
+    kept = [dataclasses.asdict(row) for row in rows]
+    command.show(options, kept, command.listed(kept))
     return 0

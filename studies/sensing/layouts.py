@@ -22,6 +22,7 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from studies.sensing.walks import Course, Log, walk
 
+_TEXT = pathlib.Path(__file__).with_suffix('.msg').read_text('utf-8')
 DEFINITIONS = {
     name: text.rstrip('\n')
     for name, _, text in (

@@ -39,9 +39,7 @@ COURSE = Course(rate=float(RATES[0]))
 USUAL = 250  # Hz
 EDGES = np.unique(
     np.r_[
-        0,
-        np.geomspace(2.0, USUAL * LONGEST, 90),
-        np.geomspace(USUAL * LONGEST, USUAL * AFTER, 20),
+        0, np.geomspace(2.0, USUAL * LONGEST, 90), np.geomspace(USUAL * LONGEST, USUAL * AFTER, 20)
     ].astype(int)
 )  # samples between which errors are averaged
 UNLOADED = 1.0  # N
@@ -285,10 +283,7 @@ UNITS = {'feet slide for long': 'feet', 'low rates': 'Hz'}
 
 def summary(found: Sequence[Curve]) -> str:
     """Return where each method diverges, is in doubt and is wrong without a doubt, in Markdown."""
-    lines = [
-        '| case | ' + ' | '.join(('law', *METHODS)) + ' |',
-        '|---' * (len(METHODS) + 2) + '|',
-    ]
+    lines = ['| case | ' + ' | '.join(('law', *METHODS)) + ' |', '|---' * (len(METHODS) + 2) + '|']
     for case in dict.fromkeys(curve.case for curve in found):
         curves = [curve for curve in found if curve.case == case]
         cells = [f'{case}, {UNITS.get(case, "s")}', *map(_limits, curves)]

@@ -18,7 +18,6 @@ REST = 2.0  # s at rest before the walk
 GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
 SETTLE = 1.0  # s before the log, in which the robot comes to rest on its feet
 RAMP = 1.0  # s until the full stride
-FLOORS = ('dry', 'patches', 'ice')
 PATCH = 0.4  # m, edge of the squares of a floor
 START_FRICTION = 0.7  # of the ground at rest
 POINT = 1e-4  # m, radius of the ball that stands for a foot that does not roll

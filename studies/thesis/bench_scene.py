@@ -300,10 +300,7 @@ def _foot(table: Table, foot: Foot) -> FootBench:
         numbers = _dragged(table, part) | _numbers(part, roughness=('m', 0.0, 1e-3))
     with table.table('doubt') as part:
         factor = part.number('factor', '(factor)', 1.0, 10.0)
-        samples, seed = (
-            part.integer('samples', 20, 100000),
-            part.integer('seed', 0, 2**32 - 1),
-        )
+        samples, seed = (part.integer('samples', 20, 100000), part.integer('seed', 0, 2**32 - 1))
     pressure = table.number('pressure', 'Pa', 1e3, foot.ceiling)
     carried = foot.pads * float(force_limit(foot.pad, pressure, foot.limit))
     if not carried:

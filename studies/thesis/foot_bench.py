@@ -21,15 +21,15 @@ from ros_pad.contact.limits import force_limit
 from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid, hysteresis_force, meniscus
 from ros_pad.contact.pad import Array
 from ros_pad.contact.resistance import Foot
-from studies.thesis.bench import CAPILLARY, DRY, NOT_CODED, WET, BenchTrial, Curve, Row, slip_force
+from studies.thesis.bench import NOT_CODED, BenchTrial, Curve, Row
 from studies.thesis.bench_scene import BenchScene, FootBench
 from studies.thesis.explained import MINIMAL, Claim, Omission, claim, left_out, notes
+from studies.thesis.tangential import CAPILLARY, DRY, WET, slip_force
 
 FLAT, DOME = 'flat', 'dome'
 SMOOTH, ROUGH = 'smooth', 'rough'
 CASES = tuple(itertools.product((FLAT, DOME), (SMOOTH, ROUGH)))
 NONE, LINES, SUCTION = 'no capillary force', 'pinned lines', 'pinned lines and suction'
-SECTION, FOOT_OF_43 = '4.3.1', 'model/foot.md#the-foot-of-chapter-43'
 PATTERN = '4.18, gaps full of water'
 STRAIGHT = 0.02  # deviation over the largest force up to which a line is straight; ours
 LOW, HIGH = 0.05, 0.95  # quantiles of an interval

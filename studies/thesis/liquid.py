@@ -57,8 +57,6 @@ _CURVE = tuple(np.linspace(90.0, 0.0, 31))
 _HALF = Liquid(0.004, 0.002)
 _BALANCES = {'energy': '-', 'thesis': (0, (4, 2))}
 _LEVEL = {'energy': (GREEN, '-'), 'force': (BLUE, (0, (1, 1))), 'thesis': (VERMILION, (0, (4, 2)))}
-SECTION, CAPILLARY = '4.2.1', 'capillary.md#what-the-thesis-prints-otherwise'
-ON_DOME = 'On one of its pressed domes; the size of its mesh is not printed.'
 _ALIGNED = 0.15  # relative error up to which heights count as well aligned
 _CONE = (1.6e-3, 1.6e-3 - 2e-3 * math.tan(math.radians(10.0)), 2e-3)
 
@@ -213,19 +211,6 @@ def _one_of_many() -> Mesh:
 
 # --- what is drawn -------------------------------------------------------------------------------
 
-_MEASURED = 'Nothing: the thesis computes it and measures none of it.'
-_MODELLED = (
-    'Layers on a mesh (chapter 4): in each slice round the axis the surface is an arc of a '
-    'circle, and its height is in balance. The balance of energy is ours; the balance of the '
-    'thesis is 4.11, summed up from the floor. Both are compared with the exact meniscus of a '
-    'wide bath.'
-)
-_ASSUMED = (
-    'The dome: 75 kPa under 0.19 N, radius 1.5 mm, one of the pressed domes that the thesis '
-    'measured; the thesis shows the size of its mesh only in a picture. The contact angle follows '
-    'from the tensions (3.81). The floor is wet, so the surface meets it at an angle of 0.'
-)
-
 
 def _figure_26() -> Explained:
     figure = Figure(figsize=(WIDE, 2.15))
@@ -245,11 +230,7 @@ def _figure_26() -> Explained:
         )
         figure.text(k / 3.0 + 0.015, 0.93, f'({"abc"[k]}) {name}')
         figure.text(k / 3.0 + 0.015, 0.04, f'{heights} mm', fontsize=7.0)
-    return explained(
-        26,
-        figure,
-        _claims_26(),
-    )
+    return explained(26, figure, _claims_26())
 
 
 def _claims_26() -> tuple[Claim, ...]:
@@ -286,10 +267,7 @@ def _figure_27() -> Explained:
     left.plot(np.degrees(turns), [1e6 * found.section(a) for a in turns], color=BLUE)
     twin = left.twinx()
     twin.plot(
-        np.degrees(turns),
-        [1e6 * found.force(a) for a in turns],
-        color=VERMILION,
-        ls=(0, (4, 2)),
+        np.degrees(turns), [1e6 * found.force(a) for a in turns], color=VERMILION, ls=(0, (4, 2))
     )
     twin.spines['right'].set_visible(True)
     twin.set_ylim(None, 0.0)
@@ -309,11 +287,7 @@ def _figure_27() -> Explained:
     right.axvline(0.0, color=BLACK, lw=0.7)
     right.set_xlabel('force along the motion / µN')
     right.set_title('(b) dome')
-    return explained(
-        27,
-        figure,
-        _claims_27(readings),
-    )
+    return explained(27, figure, _claims_27(readings))
 
 
 class _Readings(NamedTuple):
@@ -399,11 +373,7 @@ def _figure_28() -> Explained:
     ]
     legend(figure, handles)
     curve = climbed(tension, 'energy')[1]
-    return explained(
-        28,
-        figure,
-        _claims_28(layers, truths, curve),
-    )
+    return explained(28, figure, _claims_28(layers, truths, curve))
 
 
 def _claims_28(layers: list[float], truths: list[float], curve: Array) -> tuple[Claim, ...]:
@@ -444,11 +414,7 @@ def _figure_29() -> Explained:
     ax.set_xlabel('tension of the solid / (mN/m)')
     ax.set_ylabel('wetted height / mm')
     legend(figure, _handles(), 3)
-    return explained(
-        29,
-        figure,
-        _claims_29(),
-    )
+    return explained(29, figure, _claims_29())
 
 
 def _claims_29() -> tuple[Claim, ...]:
@@ -509,11 +475,7 @@ def _figure_30() -> Explained:
     ax.set_xlabel('wetted height / mm')
     ax.set_ylabel('radius of curvature / mm')
     legend(figure, _handles(), 3)
-    return explained(
-        30,
-        figure,
-        _claims_30(),
-    )
+    return explained(30, figure, _claims_30())
 
 
 def _claims_30() -> tuple[Claim, ...]:
@@ -567,11 +529,7 @@ def _figure_31() -> Explained:
         )
     ax.set(xlabel='distance of neighbours / mm', ylabel='height / mm', ylim=(0.0, 2.2))
     ax.legend(loc='upper right', ncols=2, fontsize=7.0)
-    return explained(
-        31,
-        figure,
-        _claims_31(true, limit),
-    )
+    return explained(31, figure, _claims_31(true, limit))
 
 
 def _claims_31(true: list[float], limit: float) -> tuple[Claim, ...]:

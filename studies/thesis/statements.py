@@ -24,16 +24,6 @@ PRESSURE = 75e3  # Pa gauge
 FORCES = (0.08, 0.19, 0.285)  # N, as the program of the thesis presses
 WALKED = (40e3, 60e3, 75e3)  # Pa gauge, thesis 5.2
 LOAD, FILM = 2.5, 3e-4  # N and m, of the foot and the floor of those walks
-_FREE, _PRESSED, _RING, _SOLE, _MATERIALS = (
-    f'errata.md#{part}'
-    for part in (
-        'free-dome',
-        'pressed-dome',
-        'liquid-ring',
-        'design-of-the-sole',
-        'materials-of-the-pads',
-    )
-)
 
 
 def claims() -> tuple[Claim, ...]:
@@ -129,14 +119,12 @@ def _domes() -> tuple[Claim, ...]:
     needed = TENSION['corrected'] * k / r
     end = largest_pressure(LARGE_PAD, 'flattening')
     widest = float(inflate(LARGE_PAD, end).sphere_radius) / r
-    section = '3.1.3'
     return (
         claim(
             'area of a dome',
             f'{area:.2f} π r₀², {100 * (math.sqrt(area) - 1):.0f} %.',
             (area, math.sqrt(area) - 1.0),
             abs(area / 7.8 - 1.0) <= 0.01 and abs((math.sqrt(area) - 1.0) / 1.8 - 1.0) <= 0.01,
-            section=section,
         ),
         claim(
             'domes work at r',
@@ -144,7 +132,6 @@ def _domes() -> tuple[Claim, ...]:
             f'{1e-3 * end:.1f} kPa, where R = {widest:.2f} r₀.',
             (needed, end),
             needed <= end,
-            section=section,
         ),
     )
 
@@ -158,28 +145,24 @@ def _soles() -> tuple[Claim, ...]:
         {c: float(force_limit(pad, PRESSURE, c)) / (math.pi * pad.radius**2) for c in _LIMITS}
         for pad in (small, LARGE_PAD)
     ]
-    section = '3.1.3'
     return (
         claim(
             'number of pads on',
             f'{pads:.2f} times as many as fit: even flat ones overlap.',
             (pads,),
             abs(pads - 1.0) <= MINIMAL,
-            section=section,
         ),
         claim(
             'pressure for r 1',
             f'{TENSION["corrected"]:.4f} k/r₀.',
             (pressure,),
             abs(pressure - 1.0) <= 0.01,
-            section=section,
         ),
         claim(
             'force that presses all',
             f'{FLAT["corrected"]:.3f} k S/r₀, {force:.2f} times less.',
             (force,),
             abs(force - 1.0) <= MINIMAL,
-            section=section,
         ),
         claim(
             'smaller pads carry more',
@@ -191,7 +174,6 @@ def _soles() -> tuple[Claim, ...]:
             + '.',
             tuple(each[c] for each in per_area for c in _LIMITS),
             all(per_area[0][c] > per_area[1][c] for c in _LIMITS),
-            section=section,
         ),
     )
 
@@ -254,12 +236,7 @@ def _feet() -> tuple[Claim, ...]:
             (carried, robot),
             None,
         ),
-        claim(
-            'at high pressure the',
-            'Soles are rigid here.',
-            (),
-            None,
-        ),
+        claim('at high pressure the', 'Soles are rigid here.', (), None),
     )
 
 

@@ -52,13 +52,6 @@ NUMBERS = (38, 39, *FLOOR_OF)
 ABOUT = 0.2  # relative error up to which a ratio is "approximately five times"
 STRAIGHT = 0.02  # "straight": m aside for each metre of distance; "firmly": slip over stroke
 
-_RAIL_SECTION, _RAIL_NUMBERS = '5.2', 'assumptions.md#the-leg-on-its-rail-thesis-52'
-_RAIL_TUNED = 'mass, rolling drag and load of the leg, friction and film of its foot'
-_DEMAND = 'Dry friction is assumed above the demand of the gait.'
-_HEXAPOD_SECTION, _HEXAPOD_NUMBERS = '5.3', 'model/thesis_walks.md'
-_HEXAPOD_TUNED = (
-    'friction and film of the feet, drag of the hoses, share and length of wet patches'
-)
 
 Walks = Mapping[tuple[str, int], Trial]
 
@@ -102,20 +95,6 @@ def draw(walks: Walks, numbers: Collection[int] = NUMBERS) -> list[Explained]:
 
 
 # --- the leg on its rail -------------------------------------------------------------------------
-
-_RAIL_MEASURED = (
-    'Nothing: the thesis gives no numbers of points. Its text gives the order of the five cases, '
-    'and "approximately five times" between flat and 75 kPa on wet ground.'
-)
-_RAIL_MODELLED = (
-    'A body on wheels on a rail, pushed by one foot (L0): the capacity of the foot follows from '
-    'its pads, their pressure, and the film of liquid that drains from under them.'
-)
-_RAIL_ASSUMED = (
-    'Mass, rolling drag, load of the springs, stroke and times of the gait; the friction of the '
-    'foot, 19 pads, and the film of 0.3 mm. The drag of 0.235 N is chosen to give the factor of '
-    'five, so that the agreement is no evidence.'
-)
 
 
 def _figure_38(walks: Walks) -> Explained:
@@ -247,20 +226,6 @@ def _claims_39(times: Mapping[str, float | None], less: float) -> tuple[Claim, .
 
 
 # --- the hexapod ---------------------------------------------------------------------------------
-
-_HEXAPOD_MEASURED = (
-    'Nothing: the thesis gives no numbers of points, and the axes of its picture are not legible. '
-    'Its text states which cases slip and deviate.'
-)
-_HEXAPOD_MODELLED = (
-    'The hexapod with joints (L2, MuJoCo), open loop, on three floors with gaps in their liquid; '
-    'the capacity of its feet follows from pads, pressure and film.'
-)
-_HEXAPOD_ASSUMED = (
-    'The robot (Lynxmotion CH3-R), its gait, the friction of the feet, and what makes low '
-    'friction matter: 3 N of hoses that it drags, and gaps in the liquid (85 % wet, '
-    'patches of 0.5 m). Wet all over, the walk slows but stays straight.'
-)
 
 
 def _feet(walks: Walks, number: int, floor: str) -> Explained:

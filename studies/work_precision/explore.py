@@ -160,19 +160,18 @@ def main(words: Sequence[str]) -> int:
                     save(options.out / 'explore.png', page.screenshot(full_page=True))
                 times[foot] = measure(page, options.moves)
                 page.close()
-    lines = [f'{"":24}{"page, ms":>16}{"processor, ms":>16}']
-    lines += [f'{"foot":12}{"slider":12}' + 2 * f'{"median":>8}{"95 %":>8}']
+    rows = []
     for foot, found in times.items():
         for name in (*found, 'all'):
-            line = f'{foot:12}{name:12}'
-            for each in (found, alone[foot]):
-                row = each.get(name) or [time for row in each.values() for time in row]
-                line += ''.join(f'{value:8.0f}' for value in np.quantile(row, (0.5, 0.95)))
-            lines.append(line)
+            row: dict[str, Any] = {'foot': foot, 'slider': name}
+            for word, each in (('page, ms', found), ('processor, ms', alone[foot])):
+                own = each.get(name) or [time for some in each.values() for time in some]
+                row[f'{word}: median, 95 %'] = np.quantile(own, (0.5, 0.95)).tolist()
+            rows.append(row)
     load = os.getloadavg()[0]
-    lines.append(f'{load:.1f} processes on {os.cpu_count()} cores in the last minute')
+    title = f'{load:.1f} processes on {os.cpu_count()} cores in the last minute'
     kept = command.write(
         options.out, 'explore', {'load': load, 'times_ms': times, 'processor_ms': alone}
     )
-    command.show(options, kept, '\n'.join(lines))
+    command.show(options, kept, command.listed(rows, title))
     return 0

@@ -65,11 +65,7 @@ class Contact:
     def arm(self) -> np.ndarray:
         """Return the (3, 3) matrix from the twist of the body to slip and ρ times turning."""
         return np.array(
-            [
-                [1.0, 0.0, -self.lever_y],
-                [0.0, 1.0, self.lever_x],
-                [0.0, 0.0, self.turning_radius],
-            ]
+            [[1.0, 0.0, -self.lever_y], [0.0, 1.0, self.lever_x], [0.0, 0.0, self.turning_radius]]
         )
 
 

@@ -121,10 +121,7 @@ def _fitted(pad: Pad) -> tuple[Pad, ...]:
 
 
 def _ends(pad: Pad, law: Constant) -> tuple[Pad, Pad]:
-    return (
-        with_constant(pad, law.name, law.low),
-        with_constant(pad, law.name, law.high),
-    )
+    return (with_constant(pad, law.name, law.low), with_constant(pad, law.name, law.high))
 
 
 def predicted(model: Model, measured: Points) -> Array:

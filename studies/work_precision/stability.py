@@ -37,6 +37,7 @@ from ros_pad.simulation.pneumatics import (
 )
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import LeggedBody, RailBody, Scene
+from studies import command
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PAPER_STYLE, PURPLE, VERMILION
 from studies.work_precision.friction import Contact, Twist, elastic, exact_stick
 
@@ -93,24 +94,19 @@ def measure(progress: Progress) -> list[Outcome]:
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Return the outcomes as text, a block for each case and a line for each method."""
-    lines = []
+    """Return the outcomes as text, a line for each case and method."""
+    rows = []
     for name in dict.fromkeys(outcome.case for outcome in outcomes):
-        case = [outcome for outcome in outcomes if outcome.case == name]
-        lines += [
-            f'{name} ({case[0].input}: {case[0].measure})',
-            f'  {"method":36}  inputs  failures  first at  worst value  off the law by',
-        ]
-        for method, part in _methods(case).items():
-            failed = [row.at for row in part if row.fails]
-            values = [row.value for row in part if row.value is not None]
-            misses = [abs(row.value / row.law - 1.0) for row in part if row.value and row.law]
-            lines.append(
-                f'  {method:36}  {len(part):6d}  {len(failed):8d}'
-                f'  {f"{min(failed):.3g}" if failed else "-":>8}  {max(values, default=0.0):11.3g}'
-                f'  {f"{100.0 * max(misses):.2g} %" if misses else "-":>14}'
-            )
-    return '\n'.join(lines)
+        for method, part in _methods([row for row in outcomes if row.case == name]).items():
+            rows.append({
+                'case': f'{name}, {part[0].input}: {part[0].measure}',
+                'method': method,
+                'inputs': len(part),
+                'failures': sum(row.fails for row in part),
+                'first at': min((row.at for row in part if row.fails), default=None),
+                'worst value': max((row.value or 0.0 for row in part), default=None),
+            })  # fmt: skip
+    return command.listed(rows)
 
 
 def _methods(case: Sequence[Outcome]) -> dict[str, list[Outcome]]:
@@ -393,12 +389,6 @@ def linear_flow(first: float, second: float) -> float:
     """
     sonic, critical = _LINE.sonic_conductance, _LINE.critical_ratio
     return conductance(sonic, critical, first, second) * (first - second)
-
-
-def linear_limit() -> float:
-    """Return the longest stable step of explicit Euler with ISO's linear range, s: 2/rate."""
-    sonic, critical = _LINE.sonic_conductance, _LINE.critical_ratio
-    return 2.0 * _CAPACITY / conductance(sonic, critical, _SUPPLY, _SUPPLY)
 
 
 def fill_law(dt: float) -> float:

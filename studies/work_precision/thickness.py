@@ -274,38 +274,6 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return lines
 
 
-def table(document: dict[str, Any]) -> str:
-    """Return the results as text."""
-    lines = ['reference rows: height over radius at given pressure, and relative differences']
-    head = 'law                      edge      h/r    height  ± est.    solid  corrected  membrane'
-    lines.append(head)
-    for row in document['reference']:
-        aim = row['height']
-        words = (
-            f'{row[name] / aim - 1.0:+9.2%}' if row[name] is not None else '      out'
-            for name in ('solid', 'corrected', 'membrane')
-        )
-        lines.append(
-            f'{row["law"]:24} {row["edge"]:8} {row["ratio"]:5.3f} {aim:8.4f}'
-            f' {row["error"] / aim:7.2%} {" ".join(words)}'
-        )
-    lines.append('thin sheets at 0.3 radii: pressure over that of the membrane, less 1')
-    for row in document['thin']:
-        lines.append(f'h/r {row["ratio"]:<6g} {row["edge"]:8} {row["more"]:+.2%}')
-    lines.append('correction against solids outside of the fit: largest relative errors')
-    for row in document['summary']:
-        lines.append(
-            f'{row["edge"]:8} {row["states"]} states of {row["solids"]} solids: pressure'
-            f' {row["pressure"]:.2%} (rms {row["rms_pressure"]:.2%}), height {row["height"]:.2%},'
-            f' volume {row["volume"]:.2%}, maximum {row["maximum"]:.2%};'
-            f' solids themselves {row["of_solids"]:.2%}'
-        )
-    seconds = [row['seconds'] for row in document['held']]
-    lines.append(f'a solid takes {np.mean(seconds):.0f} s, the correction of a pad')
-    lines[-1] += f' {document["correction_s"]:.2f} s once and {document["row_us"]:.2f} us a row'
-    return '\n'.join(lines)
-
-
 def draw(held: Sequence[dict[str, Any]]) -> Figure:
     """Return the picture: pressure over height of three thicknesses, and errors over height."""
     with matplotlib.rc_context(STYLE):
@@ -371,5 +339,8 @@ def main(words: Sequence[str]) -> int:
     }
     document['summary'] = summary(document['held'])
     kept = command.write(options.out, 'thickness', document, {'thickness': draw(document['held'])})
-    command.show(options, kept, table(document))
+    parts = ('reference', 'thin', 'summary')
+    texts = [command.listed(document[part], part) for part in parts]
+    texts.append(f'a pad is prepared in {prepared:.2f} s, a row takes {row:.2f} us')
+    command.show(options, kept, '\n'.join(texts))
     return 0

@@ -59,8 +59,7 @@ def draw_methods(rows: Sequence[Row]) -> Figure:
         c.set_yscale('symlog', linthresh=0.3, linscale=0.4)
         c.set_ylim(-0.05, 130.0)
         c.set_yticks(
-            [0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
-            ['0', '0.3', '1', '3', '10', '30', '100'],
+            [0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0], ['0', '0.3', '1', '3', '10', '30', '100']
         )
         _costs(d, rows)
         handles = [
@@ -134,7 +133,9 @@ def _costs(panel: Axes, rows: Sequence[Row]) -> None:
     for row in best(rows):
         look = _LOOKS[row.name, row.variant]
         missed = 1e2 * (row.misses or 0.0)
-        panel.plot(row.us_per_update, missed, **{'ms': 7.0, **look, 'ls': ''}, clip_on=False)
+        panel.plot(
+            row.us_per_update or math.nan, missed, **{'ms': 7.0, **look, 'ls': ''}, clip_on=False
+        )
     panel.axvline(TARGETS['us_per_update'], **_TARGET)
     panel.set(
         xscale='log', xlim=(0.08, 300.0), xlabel='time of an update, µs',

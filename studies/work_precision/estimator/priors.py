@@ -348,14 +348,8 @@ def _row(
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return coverage, share below the 5 % quantile and CRPS of each filter as text."""
-    return '\n'.join(
-        f'{row.condition:26} {row.phase:6} {row.ground:10} {row.filter:30}'
-        f' in 95 %: {row.coverage:.3f} ({row.coverages[0]:.2f} to {row.coverages[1]:.2f}),'
-        f' below 5 %: {row.below:.3f}, CRPS {row.crps:.3f}, {row.walks} walks'
-        for row in rows
-        if row.phase != 'early'
-    )
+    """Return all but the first half minute as text."""
+    return command.listed([asdict(row) for row in rows if row.phase != 'early'])
 
 
 _LOOKS = dict(

@@ -82,21 +82,8 @@ def main(words: Sequence[str]) -> int:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return the rows as text, with the counts that they rest on."""
-    heads = ('delay', 'slip_distance', 'misses', 'false_per_minute', 'us_per_update', 'wet_right')
-    heads += ('coverage', 'below')
-    lines = [f'{"part, method or change":64}' + ''.join(f'{head:>18}' for head in heads)]
-    for row in rows:
-        words = filter(None, (row.part, row.name, row.variant, f'{row.value:g} {row.unit}'))
-        name = ', '.join(words).strip() + (' *' if row.shipped else '')
-        values = (getattr(row, head) for head in heads)
-        cells = ('-' if value is None else f'{value:.3g}' for value in values)
-        lines.append(f'{name:64}' + ''.join(f'{cell:>18}' for cell in cells))
-        lines += [
-            f'    {row.note}, {row.walks} walks, {row.slips} slips, {key} {low:.3g} to {high:.3g}'
-            for key, (low, high) in row.intervals.items()
-        ]
-    return '\n'.join([*lines, '* as shipped; s, m, 1/min, us, shares'])
+    """Return the rows as text; s, m, 1/min, us, shares."""
+    return command.listed([asdict(row) for row in rows])
 
 
 def figures(rows: Sequence[Row]) -> dict[str, Figure]:

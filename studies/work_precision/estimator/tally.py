@@ -84,8 +84,10 @@ def replay(walk: Recording) -> Estimates:
                  now.friction_mean, now.friction_sd, now.margin, now.slip_speed)
             )  # fmt: skip
         out[sample] = found
-    flags, values = np.moveaxis(out[..., :3] > 0.5, 2, 0), np.moveaxis(out[..., 3:], 2, 0)
-    return Estimates(*flags, *values, updates=int(walk.arrived.sum()))
+    slipping, standing, fresh = np.moveaxis(out[..., :3] > 0.5, 2, 0)
+    wet, mean, sd, margin, speed = np.moveaxis(out[..., 3:], 2, 0)
+    updates = int(walk.arrived.sum())
+    return Estimates(slipping, standing, fresh, wet, mean, sd, margin, speed, updates)
 
 
 @dataclass

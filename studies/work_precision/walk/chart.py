@@ -13,16 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.pace import Progress
-from studies.drawing import BLACK, BLUE, GREEN, PALE, PURPLE, SKY, STYLE, VERMILION
+from studies import command
+from studies.drawing import BLACK, BLUE, GREEN, PALE, SKY, STYLE, VERMILION
 from studies.work_precision.walk.hexapod import DRAKE, FREE, TOP
 from studies.work_precision.walk.results import FAILED, WalkResult
 from studies.work_precision.walk.walkers import HEXAPOD, RAIL, TOWING, named
 
 # Methods that are shown walk by walk.
-SHOWN = (
-    *(named(family, 4e-3) for family in ('L1', 'L1, soles turn')),
-    *(named(family, 2e-3) for family in ('L2', 'MuJoCo defaults')),
-)
+SHOWN = (named('L1', 4e-3), *(named(family, 2e-3) for family in ('L2', 'MuJoCo defaults')))
 # Name, unit and scale of each error.
 _UNITS = {
     'distance': ('distance', '%', 1e2),
@@ -33,41 +31,25 @@ _UNITS = {
 
 
 def table(results: Sequence[WalkResult]) -> str:
-    """Return the results as text: a block for each robot, and each walk."""
-    lines: list[str] = []
+    """Return the results as text: errors and times, and then each walk, mm a cycle."""
+    lines = [command.listed([{**vars(result), 'walks': ''} for result in results])]
     for robot in dict.fromkeys(result.robot for result in results):
         part = [result for result in results if result.robot == robot]
-        first = part[0]
-        lines.append(
-            f'{robot} ({first.cases} walks of {first.cycles} cycles; median and worst errors'
-            f' against {first.top}; times against {first.baseline})'
-        )
-        for result in part:
-            errors = ', '.join(
-                f'{name} {scale * result.errors[name]:.2g} to {scale * result.worst[name]:.2g}'
-                f' {unit}'
-                for name, (_, unit, scale) in _UNITS.items()
-                if name in result.errors
-            )
-            lines.append(
-                f'  {result.method:28} {result.ms_per_second:8.3g} ms/s'
-                f' {result.us_per_step:8.3g} us/step, ratio {result.versus:.2g}; off by {errors};'
-                f' fails {result.failures}, slip fails {result.slip_failures},'
-                f' refused {result.refused}'
-            )
-        for row, walk in enumerate(first.walks):
-            cells = ', '.join(_went(result, row) for result in part)
-            lines.append(f'  {walk["walk"]}, mm a cycle (slip): {cells}')
-        if robot == HEXAPOD and DRAKE not in {result.family for result in part}:
-            lines.append('left out: Drake, and a reference of two engines: pip install drake')
+        rows = [
+            {'walk': walk['walk']} | {result.method: _went(result, row) for result in part}
+            for row, walk in enumerate(part[0].walks)
+        ]
+        lines.append(command.listed(rows, f'\n{robot}: distance (slip), mm a cycle'))
+    if DRAKE not in {result.family for result in results}:
+        lines.append('left out: Drake, and a reference of two engines: pip install drake')
     return '\n'.join(lines)
 
 
 def _went(result: WalkResult, row: int) -> str:
     walk = result.walks[row]
     if walk['verdict']:
-        return f'{result.method} verdict'
-    return f'{result.method} {1e3 * walk["distance"]:.1f} ({1e3 * walk["slip"]:.1f})'
+        return 'verdict'
+    return f'{1e3 * walk["distance"]:.1f} ({1e3 * walk["slip"]:.1f})'
 
 
 def figures(results: Sequence[WalkResult], progress: Progress | None = None) -> dict[str, Figure]:
@@ -78,7 +60,6 @@ def figures(results: Sequence[WalkResult], progress: Progress | None = None) -> 
 _LOOKS: dict[str, dict[str, Any]] = {
     'L1': {'color': BLUE, 'marker': 'o'},
     'L1, compiled': {'color': SKY, 'marker': 's'},
-    'L1, soles turn': {'color': PURPLE, 'marker': 'o'},
     'L2': {'color': GREEN, 'marker': 'D'},
     'MuJoCo defaults': {'color': VERMILION, 'marker': 'X'},
     DRAKE: {'color': BLACK, 'marker': '^'},

@@ -72,12 +72,9 @@ def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
 def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     """Return the available walkers, and the names of the references and the baseline of times."""
     walkers = []
-    forms = {'L1': False}
-    if importlib.util.find_spec('numba'):
-        forms['L1, compiled'] = True
+    forms = {'L1': False} | ({'L1, compiled': True} if importlib.util.find_spec('numba') else {})
     for family, compiled in forms.items():
-        for step in (1e-3, 4e-3, 1e-2):
-            walkers.append(_planar(family, step, compiled))
+        walkers += [_planar(family, step, compiled) for step in (1e-3, 4e-3, 1e-2)]
     if not importlib.util.find_spec('mujoco'):
         top = _planar('L1', TOP_STEP, False)
         return [*walkers, top], (top.name,), named('L1', SAMPLE)
@@ -89,10 +86,7 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     ]
     baseline = named('L2', RECOMMENDED.timestep)
     if importlib.util.find_spec('pydrake'):
-        tops: tuple[Walker, ...] = (
-            _full(TOP, replace(RECOMMENDED, timestep=1e-4)),
-            _drake(1e-4),
-        )
+        tops: tuple[Walker, ...] = (_full(TOP, replace(RECOMMENDED, timestep=1e-4)), _drake(1e-4))
         walkers += [_drake(step) for step in (2e-4, 4e-4)]
     else:
         # The finer one shows the uncertainty of the reference.

@@ -46,7 +46,7 @@ def measure(progress: Progress, cycles: int | None = None) -> list[WalkResult]:
     )  # fmt: skip
     if len(tops) > 1:  # there is Drake
         towers = towing_walkers()
-        two = towers[2].name, towers[4].name
+        two = towers[1].name, towers[3].name
         results += run(
             TOWING, towing_walks(), towers, two, two[0], lambda done: progress(0.7 + 0.2 * done),
             cycles,

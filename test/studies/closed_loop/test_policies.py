@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from ros_pad.control import policy_named
 from ros_pad.control.policies import Choice, LiftOff
 from ros_pad.simulation import Scene
-from studies.closed_loop import policies, quick_walk, rivals
+from studies.closed_loop import policies, rivals
 
 STEP = LiftOff(1, 'flat', 9, False, 0.5, (0.0, 0.0), False)
 
@@ -64,15 +63,3 @@ def test_a_bandit_takes_the_morphology_that_goes_further_and_tries_the_other():
         chosen.append(morphology)
         before, x = x, x + (0.13 if morphology == 'flat' else 0.02)
     assert 0.7 < chosen.count('flat') / 300 < 1.0
-
-
-def test_a_walk_without_dynamics_goes_as_far_as_one_with_dynamics():
-    """From docs/charts/policies.json: fixed morphologies in L2, within 3 %, mm a cycle."""
-    scene = replace(Scene.load(policies.SCENE), cycles=12)
-    for kind, policy, expected in (
-        ('wet', 'flat', 81.5), ('wet', 'dome', 139.7), ('dry', 'flat', 127.1),
-        ('dry', 'dome', 97.9),
-    ):  # fmt: skip
-        ground = replace(scene, floor=replace(scene.floor, kind=kind))
-        distance = quick_walk.walk(ground, policy_named(policy), policy, 0)
-        assert 1e3 * distance == pytest.approx(expected, rel=0.03)

@@ -15,7 +15,8 @@ from scipy.optimize import brentq, minimize_scalar
 from ros_pad import configuration
 from ros_pad.errors import ConfigError, NoEquilibrium
 from studies.thesis import bench
-from studies.thesis.bench import CODED, slip_force
+from studies.thesis.bench import CODED
+from studies.thesis.tangential import slip_force
 
 BENCHES = ('inflation', 'press', 'tangential', 'foot')
 
@@ -102,10 +103,7 @@ def drained(radius, contact_pressure, time, viscosity=1e-3, start=3e-4):
     return math.exp(solved.y[0, -1])
 
 
-@pytest.mark.parametrize(
-    'load, pressure, sole',
-    [(0.3, 75e3, 12e-3), (0.4, 0.0, 3.2e-3)],
-)
+@pytest.mark.parametrize('load, pressure, sole', [(0.3, 75e3, 12e-3), (0.4, 0.0, 3.2e-3)])
 def test_onset_of_slip_by_another_method(load, pressure, sole):
     """The film is integrated; slip begins where the pull first exceeds the friction."""
     foot = dataclasses.replace(ONE, sole_radius=sole)
@@ -173,10 +171,7 @@ def test_the_title_is_decided_where_all_draws_agree(changes, holds):
 
 @pytest.mark.parametrize(
     'force, expected, water',
-    [
-        (0.08, 0.0662058309e-3, 1.72557276e-3),
-        (0.285, 0.0701850904e-3, 1.52495866e-3),
-    ],
+    [(0.08, 0.0662058309e-3, 1.72557276e-3), (0.285, 0.0701850904e-3, 1.52495866e-3)],
 )
 def test_capillary_force_is_that_of_the_program(tmp_path, force, expected, water):
     table = f'pressure [Pa], force_limit [N]\n75e3, {force}\n'

@@ -48,7 +48,6 @@ def test_rows_count_time_and_stances():
     assert second.below == 0.1 and second.wrong_labels == 0.5
     assert second.crps == pytest.approx((9 * 0.01 + 0.05) / 10, abs=1e-4)
     assert (both.ground, both.coverage) == ('all', 0.9)
-    assert 'in 95 %: 0.900 (0.90 to 0.90), below 5 %: 0.100' in priors.table([second])
 
 
 def test_the_foot_of_a_walk_has_the_friction_of_its_condition():

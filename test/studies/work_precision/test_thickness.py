@@ -64,6 +64,6 @@ def test_the_study(tmp_path, monkeypatch, capsys):
     assert (tmp_path / 'thickness.png').stat().st_size > 10_000
     # Of another program: +1.8 %.
     assert kept['thin'][1]['more'] == pytest.approx(0.018, abs=0.001)
-    assert f'{kept["thin"][1]["more"]:+.2%}' in out
+    assert f'{kept["thin"][1]["more"]:.4g}' in out
     for row in kept['summary']:
         assert row['pressure'] < 0.025 and row['height'] < 0.025 and row['volume'] < 0.04
