@@ -24,13 +24,13 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message
+from ros_pad.bags.definitions import message_definition, type_hash
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Bool, Float64, String
 
 from ros_pad.bags import BagReader, BagWriter, annotate, metadata, storage
-from ros_pad.bags.definitions import message_definition, type_hash
 from ros_pad.bags.wire import Wire
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.records import ESTIMATE, PRESSURE, SAMPLE, Block
