@@ -214,16 +214,11 @@ def test_contact_of_the_pad_of_a_foot(capsys: pytest.CaptureFixture[str]):
 
 def test_contact_of_a_pad_of_a_material(capsys: pytest.CaptureFixture[str]):
     sheet = ['--material', 'dragon_skin_10', '--radius', '1.5e-3', '--thickness', '0.4e-3']
-    answers = []
-    for edge in ([], ['--edge', 'bonded'], ['--edge', 'clamped']):
-        assert cli.main(['contact', '--pressure', '30e3', *sheet, *edge, '--json']) == 0
-        answers.append(json.loads(capsys.readouterr().out))
-    heights = [each['free']['height_m'] for each in answers]
-    assert heights == sorted(heights, reverse=True) and heights[2] < 0.9 * heights[0]
-    limits = [set(each['force_limit_n']) for each in answers]
-    assert limits == [{'thickness', 'wall', 'flattening'}, set(), set()]
-    assert [answers[0][key] for key in ('adhesion', 'model')] == ['none', 'membrane']
-    for option in (['--adhesion', 'text'], ['--model', 'thesis']):
+    assert cli.main(['contact', '--pressure', '30e3', *sheet, '--json']) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert set(answer['force_limit_n']) == {'thickness', 'flattening'}
+    assert [answer[key] for key in ('adhesion', 'model')] == ['none', 'membrane']
+    for option in (['--adhesion', 'none'], ['--model', 'thesis']):
         assert cli.main(['contact', '--pressure', '30e3', *sheet, *option]) == 2
         assert f'{option[0]} is not allowed for a pad of a material' in capsys.readouterr().err
     in_mm = ['--material', 'dragon_skin_10', '--radius', '1.5', '--thickness', '0.4']
@@ -231,13 +226,6 @@ def test_contact_of_a_pad_of_a_material(capsys: pytest.CaptureFixture[str]):
     assert '--radius = 1.5 is not allowed: a number from 0.0001' in capsys.readouterr().err
     assert cli.main(['contact', '--pressure', '30e3', *in_mm[:2]]) == 2
     assert '--radius is missing: a number from 0.0001 to 0.01 m' in capsys.readouterr().err
-    bonded = ['contact', '--pressure', '30e3', '--edge', 'bonded']
-    assert cli.main([*bonded, *sheet]) == 0
-    assert 'none is known for a pad with an edge' in capsys.readouterr().out
-    assert cli.main([*bonded, *sheet, '--force', '0.1']) == 2
-    assert 'free domes only' in capsys.readouterr().err
-    assert cli.main(bonded) == 2
-    assert '--edge is not allowed without --material' in capsys.readouterr().err
 
 
 def test_contact_prints_the_thesis_height(capsys: pytest.CaptureFixture[str]):
@@ -269,10 +257,10 @@ def test_a_shape_is_shown_where_no_force_limit_is_known(capsys: pytest.CaptureFi
     above = ['contact', '--pressure', '100e3', '--force', '0.1', '--model', 'membrane']
     assert cli.main(above) == 0
     said = capsys.readouterr().out
-    assert said.count('not known above 91342 Pa') == 5
+    assert said.count('not known above 91342 Pa') == 3
     assert cli.main([*above, '--json']) == 0
     limits = json.loads(capsys.readouterr().out)['force_limit_n']
-    assert len(limits) == 5 and set(limits.values()) == {None}
+    assert len(limits) == 3 and set(limits.values()) == {None}
     # No limit was measured on the small pad.
     assert cli.main(['contact', '--pressure', '40e3', '--pad', 'small', '--json']) == 0
     limits = json.loads(capsys.readouterr().out)['force_limit_n']

@@ -14,7 +14,6 @@ from ros_pad.configuration import number
 from ros_pad.contact.dome import ADHESION_SIGNS, MODELS
 from ros_pad.contact.limits import criteria, largest_pressure
 from ros_pad.contact.resistance import RUBBER_SETTINGS
-from ros_pad.contact.thickness import HIGHEST
 from ros_pad.errors import InvalidInput, NoEquilibrium
 
 _TITLES = {
@@ -68,12 +67,6 @@ def add(commands: Commands) -> None:
     part.add_argument('--radius', type=float, metavar='M', help='of a pad of a material, m')
     part.add_argument('--thickness', type=float, metavar='M', help='of a pad of a material, m')
     part.add_argument(
-        '--edge',
-        choices=tuple(HIGHEST),
-        help='how the sheet of a pad of a material is held at its rim: its free dome is corrected '
-        'for thickness (default: a membrane)',
-    )
-    part.add_argument(
         '--adhesion',
         choices=tuple(ADHESION_SIGNS),
         help='sign of the adhesion between pad and floor (default matlab: the floor attracts); '
@@ -104,7 +97,6 @@ def run(options: argparse.Namespace) -> int:
         'pad': options.material or options.foot or options.pad,
         'radius_m': pad.radius,
         'stiffness_n_per_m': pad.stiffness,
-        'edge': pad.edge,
         'adhesion': options.adhesion,
         'model': options.model,
         'pressure_pa': pressure,
@@ -148,9 +140,9 @@ def _pad(options: argparse.Namespace) -> tuple[contact.Pad, str]:
             number(f'--{each.name}', getattr(options, each.name), each.unit, each.low, each.high)
             for each in sizes
         )
-        made = contact.Pad.of(material, radius, thickness, edge=options.edge)
+        made = contact.Pad.of(material, radius, thickness)
         return made, f'pad of {options.material}'
-    for key in ('radius', 'thickness', 'edge'):
+    for key in ('radius', 'thickness'):
         if getattr(options, key) is not None:
             raise InvalidInput(f'--{key} is not allowed without --material')
     return pad, name
@@ -229,5 +221,3 @@ def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radi
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
         if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad_radius:
             print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')
-    if not ends:
-        print('  none is known for a pad with an edge: pressed, it has no model')

@@ -162,11 +162,6 @@ def _check_constants(source: str, fit: str, constants: Sequence[Constant]) -> No
 def _start(foot: Foot, fit: str | None, rubber: Pad | None) -> tuple[Pad, str]:
     """Return the pad from which the fit starts, and what is fitted."""
     start = foot.pad if rubber is None else rubber
-    if start.edge is not None:
-        raise InvalidInput(
-            f'edge = {start.edge} is not allowed in a calibration: feet are pressed, and shapes'
-            ' under load are not known with an edge; a pad without edge is needed'
-        )
     if fit is not None:
         choice('fit', fit, FITS)
     if start.material is not None:

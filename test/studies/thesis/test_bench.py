@@ -244,8 +244,8 @@ def test_force_limits_of_the_model():
     trial = TRIALS['tangential']
     flat = trial.pick('force limit', 'flattening')
     assert modelled(flat) == [pytest.approx(f, abs=6e-4) for f in (0.456, 0.527, 0.598)]
-    deep = trial.pick('force limit', 'max_depth')
-    assert modelled(deep) == [pytest.approx(f, abs=1.5e-3) for f in (0.256, 0.323, 0.413)]
+    deep = trial.pick('force limit', 'thickness')
+    assert modelled(deep) == [pytest.approx(f, abs=1.5e-3) for f in (0.244, 0.317, 0.404)]
     assert [row.measured for row in deep] == [0.15, 0.30, 0.40]
 
 

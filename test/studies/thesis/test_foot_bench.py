@@ -180,7 +180,7 @@ def test_a_film_that_rubs_enough_settles_the_sign():
 
 def test_domes_of_one_criterion_or_another_hold_the_same():
     """Below its limit the criterion does not enter: every dome carries its share."""
-    foot = dataclasses.replace(SCENE.foot, limit='max_depth')
+    foot = dataclasses.replace(SCENE.foot, limit='flattening')
     assert foot_bench.pull(foot, SCENE.setup, 3.0, DOME) == pull(DOME, SMOOTH, 3.0)
     line = dataclasses.replace(SCENE.foot, limit='measured')
     assert line.dome_load(3.0, PRESSURE) == 0.0
