@@ -20,7 +20,6 @@ STUDIES = {
     'priors': ('work_precision.estimator.priors', 'friction with wrong foot files (30 min)'),
     'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),
     'liquid_limits': ('work_precision.liquid_limits', 'where liquid on meshes fails (4 min)'),
-    'thickness': ('work_precision.thickness', 'solids beside the membrane of a pad (5 min)'),
     'sensing': ('sensing.study', 'body and slip from IMU, joints and forces (3 min)'),
     'foreign': ('sensing.foreign', 'the same on recordings of real robots (2 min)'),
     'film': ('work_precision.film', 'liquid squeezed from under soft pads (6 min)'),

@@ -13,7 +13,6 @@ from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.configuration import number
 from ros_pad.contact.dome import MODELS
 from ros_pad.contact.limits import criteria, largest_pressure
-from ros_pad.contact.thickness import HIGHEST
 from ros_pad.errors import InvalidInput, NoEquilibrium
 
 _TITLES = {
@@ -51,8 +50,6 @@ def add(commands: Commands) -> None:
     which.add_argument('--material', help=text)
     add('--radius', type=float, metavar='M', help='of a pad of a material, m')
     add('--thickness', type=float, metavar='M', help='of a pad of a material, m')
-    text = 'how its sheet is held at the rim: the free dome is corrected for thickness'
-    add('--edge', choices=tuple(HIGHEST), help=text)
     add(
         '--model',
         choices=MODELS,
@@ -70,7 +67,6 @@ def run(options: argparse.Namespace) -> int:
         'pad': options.material or options.foot or options.pad,
         'radius_m': pad.radius,
         'stiffness_n_per_m': pad.stiffness,
-        'edge': pad.edge,
         'model': options.model,
         'pressure_pa': pressure,
         'force_n': force,
@@ -101,9 +97,9 @@ def _pad(options: argparse.Namespace) -> contact.Pad:
         material = contact.Material.load(options.material)
         radius = number('--radius', options.radius, 'm', 1e-4, 1e-2)
         thickness = number('--thickness', options.thickness, 'm', 1e-5, 1e-2)
-        pad = contact.Pad.of(material, radius, thickness, edge=options.edge)
+        pad = contact.Pad.of(material, radius, thickness)
     else:
-        for key in ('radius', 'thickness', 'edge'):
+        for key in ('radius', 'thickness'):
             if getattr(options, key) is not None:
                 raise InvalidInput(f'--{key} is not allowed without --material')
         pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
@@ -158,5 +154,3 @@ def _show(values: dict[str, Any], ends: dict[str, float]) -> None:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
         if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > values['radius_m']:
             print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')
-    if not ends:
-        print('  none is known for a pad with an edge: pressed, it has no model')

@@ -106,11 +106,6 @@ def calibrate(
     number('film_thickness', film_thickness, 'm', above=True)
     number('viscosity', viscosity, 'Pa s', above=True)
     start = foot.pad if rubber is None else rubber
-    if start.edge is not None:
-        raise InvalidInput(
-            f'edge = {start.edge} is not allowed in a calibration: feet are pressed, and shapes'
-            ' under load are not known with an edge; a pad without edge is needed'
-        )
     warnings: list[str] = []
     pad, shape = _shape(measurements, start, warnings)
     _check(measurements.source, [shape])

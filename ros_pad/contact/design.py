@@ -227,7 +227,7 @@ def design(
         :func:`ros_pad.contact.limits.largest_pressure` of the criterion.
     margin : float
         Safety factor on the load, above 0.
-    criterion : {'thickness', 'wall', 'flattening', 'max_depth', 'measured'}
+    criterion : {'thickness', 'flattening', 'measured'}
         Criterion of the force limit.
     liquid : Liquid
         Liquid for the rise height.

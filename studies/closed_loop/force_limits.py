@@ -194,7 +194,7 @@ def draw() -> Figure:
             panel.plot(1e-3 * np.array([*MEASURED]), [*MEASURED.values()], 'ko', label='points')
             panel.set(title=f'Large pad as a {name}', xlabel='gauge pressure, kPa')
         stiffer = np.linspace(0.9, 3.0, 90)
-        for criterion in ('thickness', 'wall', 'flattening'):
+        for criterion in ('thickness', 'flattening'):
             forces = [limit(like(PADS['membrane'], stiffer=k), AT, criterion) for k in stiffer]
             colour = f'C{CRITERIA.index(criterion)}'
             panels[2].plot(stiffer, np.array(forces, dtype=float), color=colour)

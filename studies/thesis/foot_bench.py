@@ -412,7 +412,7 @@ def _viscosity_claim(
 def _pressure_claim(foot: Foot, setup: FootBench) -> Claim:
     each = {
         name: foot.pads * float(force_limit(foot.pad, setup.pressure, name))
-        for name in ('measured', 'thickness', 'max_depth', 'flattening')
+        for name in ('measured', 'thickness', 'flattening')
     }
     return claim(
         'a foot stands on',

@@ -43,10 +43,11 @@ def _energy() -> tuple[Claim, ...]:
     pressed = press(LARGE_PAD, PRESSURE, list(FORCES))
     slender = np.asarray(pressed.contact_radius) / np.asarray(pressed.sphere_radius)
     light = 1e-3
-    text, program = (
-        float(press(LARGE_PAD, PRESSURE, light, adhesion=sign).contact_radius)
-        for sign in ('text', 'matlab')
-    )
+    touching = press(LARGE_PAD, PRESSURE, light)
+    program = float(touching.contact_radius)
+    # 3.53 with the minus of the text in 3.43, on the same sphere
+    pull = 2.0 * math.pi * LARGE_PAD.adhesion_energy * float(touching.sphere_radius)
+    text = math.sqrt((light - pull) / (math.pi * PRESSURE))
     return (
         claim(
             'the energy of a',
@@ -178,7 +179,7 @@ def _soles() -> tuple[Claim, ...]:
     )
 
 
-_LIMITS = ('thickness', 'max_depth', 'flattening')
+_LIMITS = ('thickness', 'flattening')
 
 
 def _pad() -> tuple[Claim, ...]:

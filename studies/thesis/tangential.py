@@ -135,7 +135,7 @@ def compute(scene: BenchScene, setup: TangentialBench, measured: Measurements) -
     rows += [
         Row(20, 'force limit', 'N', criterion, 'dome', pressure, None,
             float(force_limit(scene.pad, pressure, criterion)), limit, NO_ERROR)
-        for criterion in ('max_depth', 'flattening')
+        for criterion in ('thickness', 'flattening')
         for pressure, limit in ends.items()
     ]  # fmt: skip
     rows += [
@@ -290,7 +290,7 @@ def _tangential_claims(
             rises(ends),
         ),
         *_limits_claims(scene.pad, rows, limits),
-        _stiffer_claim(scene.pad, pick(rows, 'force limit', 'max_depth')),
+        _stiffer_claim(scene.pad, pick(rows, 'force limit', 'thickness')),
         _capillary_claim(rows),
         _rise_claim(setup, rows),
     )
@@ -387,7 +387,7 @@ def _stiffer_claim(pad: Pad, limits: Sequence[Row]) -> Claim:
     raised = {
         criterion: force_limit(stiffer, pressures, criterion)
         / force_limit(pad, pressures, criterion)
-        for criterion in ('thickness', 'max_depth', 'flattening')
+        for criterion in ('thickness', 'flattening')
     }
     return claim(
         'a harder silicone dragon',

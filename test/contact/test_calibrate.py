@@ -274,9 +274,6 @@ class TestMaterial:
         low = FreeDomes(np.array([900e3]), np.array([1.25e-3]))
         with pytest.raises(InvalidInput, match=r'factor = 32.* check the units'):
             calibrate(dataclasses.replace(NOTHING, free=low), FOOT, rubber=self.pad)
-        bonded = dataclasses.replace(self.pad, edge='bonded')
-        with pytest.raises(InvalidInput, match='edge = bonded is not allowed in a calibration'):
-            calibrate(THESIS, FOOT, rubber=bonded)
         unnamed = Pad.of(dataclasses.replace(self.pad.material, name=''), 1.5e-3, 4e-4)
         with pytest.raises(InvalidInput, match='has no name'):
             foot_file(calibrate(THESIS, FOOT, rubber=unnamed))

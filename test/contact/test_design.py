@@ -141,7 +141,7 @@ def test_what_is_asked_beyond_the_model_is_not_carried():
     # A higher ceiling does not extend the line through the measurements.
     measured = design(7.0, SOLE, ceiling=200e3, criterion='measured')
     assert measured.ceiling <= 91.36e3
-    free = design(7.0, SOLE, Pad(1e-3, 40.0), ceiling=120e3, criterion='max_depth')
+    free = design(7.0, SOLE, Pad(1e-3, 40.0), ceiling=120e3, criterion='flattening')
     assert free.ceiling == 120e3
 
 
@@ -169,7 +169,7 @@ def test_whole_cells_are_all_counted():
 
 def test_width_of_the_domes():
     # Low domes are widest at the rim, tall ones at the equator.
-    assert design(0.1, SOLE, ceiling=50e3, criterion='max_depth').dome_width == 3e-3
+    assert design(0.1, SOLE, ceiling=50e3, criterion='flattening').dome_width == 3e-3
     tall = design(18.0, SOLE)
     assert tall.pressure > 80e3
     assert tall.dome_width == 2 * inflate(LARGE_PAD, tall.pressure).sphere_radius

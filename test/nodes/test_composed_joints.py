@@ -13,7 +13,6 @@ from ros_pad.bags import BagReader, annotate
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
 from ros_pad.records import ESTIMATE, SAMPLE
-from ros_pad.robots import Robot
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay import replay
