@@ -652,7 +652,7 @@ def _settled(case: _Case, along: Array, state: Array, known: Array) -> Any:
         return np.array([*on_plane, *on_sphere, given - 1.0])
 
     with np.errstate(all='ignore'):
-        found = solve_bvp(rates, misses, along, state, known, tol=1e-9, max_nodes=20000)
+        found = solve_bvp(rates, misses, along, state, known, tol=1e-9, max_nodes=3000)
     near = found.success and abs(found.sol(along)[0] - state[0]).max() < 0.5
     sensible = found.y[1].min() > 0.0 and found.p[1] > 0.0 and 0.0 < found.p[2] < math.pi
     return found if near and sensible else None

@@ -20,8 +20,7 @@ RAW = Material('yeoh', (49365.3971147044, 3486.2557640943996, -65.8975627692))
 NEO = Material('neo_hookean', (1.5e5,))
 MOONEY = Material('mooney_rivlin', (1e5, 1e4))
 OGDEN = Material('ogden', (6.3e5, 1.3, 1.2e3, 5.0, -1e4, -2.0))
-STIFFENING = Material('yeoh', (121087.67, 1129.1859, -4.502669), 10.2)
-MATERIALS = [RAW, NEO, MOONEY, OGDEN, STIFFENING]
+MATERIALS = [RAW, NEO, MOONEY, OGDEN]
 
 
 def of(material):
@@ -143,14 +142,6 @@ class TestFree:
         with pytest.raises(NoEquilibrium, match=r'balloon.*75166\.9 Pa') as caught:
             inflate(pad, end * (1 + 1e-12))
         assert caught.value.status == 'no_inflation'
-
-    def test_maxima_of_other_pads(self):
-        gauge = Material('yeoh', (44271.71, 3593.510, -67.5749))
-        assert pressure_end(of(gauge))[0] == pytest.approx(84.64e3, rel=1e-4)
-        assert pressure_end(of(RAW))[0] == pytest.approx(87.7e3, rel=1e-3)
-        small = Pad.of(Material.load('ecoflex_00_30'), 0.5e-3, 0.2e-3)
-        assert pressure_end(small)[0] == pytest.approx(13.6e3, rel=3e-3)
-        assert pressure_end(of(MOONEY))[1] == 'out_of_range'  # none
 
     def test_height_rises_up_to_the_maximum(self):
         for material in MATERIALS:

@@ -166,17 +166,6 @@ def test_hysteresis_force(factor):
     assert type(force) is float
 
 
-def test_hysteresis_force_integrates_the_line():
-    # The contact line pulls the disc. The cosine of its angle varies as the cosine of the azimuth
-    # (factor pi/4), or jumps between the two halves of the line (factor 1).
-    azimuth = (np.arange(20000) + 0.5) * (2 * math.pi / 20000)
-    low, high = math.cos(1.9), math.cos(0.7)
-    for factor, share in ((math.pi / 4, np.cos(azimuth)), (1.0, np.sign(np.cos(azimuth)))):
-        cosines = 0.5 * (low + high) + 0.5 * (high - low) * share
-        pull = 0.05 * 1e-3 * np.mean(cosines * np.cos(azimuth)) * 2 * math.pi
-        assert hysteresis_force(1e-3, 0.05, 1.9, 0.7, factor) == pytest.approx(pull, rel=1e-6)
-
-
 def test_thesis_force_is_the_hysteresis_bound_at_its_widest():
     # Equation 3.82 without its second radius is 4 γ r.
     assert hysteresis_force(1e-3, 0.073, math.pi, 0.0) == pytest.approx(4 * 0.073e-3, rel=1e-14)

@@ -188,7 +188,7 @@ def test_a_pressed_sphere_ends_in_hertz_contact():
 # --- what holds for each film -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize('modulus', [40e3, 395e3, 4e6])
+@pytest.mark.parametrize('modulus', [40e3, 395e3])
 def test_liquid_and_load_are_kept_and_films_stay_positive(modulus):
     times = np.geomspace(1e-6, 3.0, 9)
     film = squeeze(HalfSpace(RADIUS, modulus), 3e-4, times, load=LOAD, rings=80)
@@ -232,16 +232,6 @@ def test_second_order_in_rings():
     ]
     order = math.log2((means[0] - means[1]) / (means[1] - means[2]))
     assert 1.7 < order < 2.6
-
-
-def test_results_have_the_scales_of_the_equation():
-    """Viscosity scales time; lengths and pressures scale with radius and modulus."""
-    one = squeeze(HalfSpace(RADIUS, MODULUS), 3e-5, [0.01], load=LOAD, rings=60)
-    slow = squeeze(HalfSpace(RADIUS, MODULUS), 3e-5, [0.5], load=LOAD, viscosity=0.05, rings=60)
-    assert slow.thickness == pytest.approx(one.thickness, rel=1e-4)
-    twice = HalfSpace(2 * RADIUS, 3 * MODULUS)
-    large = squeeze(twice, 6e-5, [0.01 / 3.0], load=12 * LOAD, rings=60)
-    assert large.thickness == pytest.approx(2.0 * one.thickness, rel=1e-4)
 
 
 def test_share_of_dry_contact():
