@@ -3,7 +3,7 @@
 
 Nodes of ros_pad send one another records of all feet. Robots of others publish by leg, and people
 look at single legs: :data:`OF_LEGS` has these topics, with the numbers of a record that they have.
-Nodes add message class and QoS to this table, in `ros_pad.nodes.topics`.
+Nodes add message class and QoS to this table, in `ros_pad.nodes.qos`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
 FRAME = 'header.frame_id'
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Topic:
     """A topic, or one per leg.
 
@@ -194,6 +194,12 @@ FEET_MARKERS = Topic('feet/markers', 'visualization_msgs/msg/MarkerArray', 'm')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's', values=('clock.sec', 'clock.nanosec'))
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
 
+RECORDED = (
+    *(CLOCK, *RECORDS, BODY_POSE, IMU, JOINT_STATES),
+    *(ODOM, BODY_DOUBT, MARKERS, DIAGNOSTICS),
+)
+"""The topics that a robot has only once; they are recorded."""
+
 TRIAL = (
     *(SAMPLE, ESTIMATE, COMMAND, PRESSURE, BODY_POSE, ODOM, BODY_DOUBT),
     *(topic for topic in OF_LEGS if topic.columns and topic is not LEG_FOOT_WRENCH),
@@ -236,4 +242,13 @@ def from_record(topic: Topic, numbers: np.ndarray, ambient: float) -> np.ndarray
     return values
 
 
-__all__ = ['FROM_DRIVERS', 'OF_LEGS', 'RECORDS', 'TRIAL', 'Topic', 'from_record', 'to_record']
+__all__ = [
+    'FROM_DRIVERS',
+    'OF_LEGS',
+    'RECORDED',
+    'RECORDS',
+    'TRIAL',
+    'Topic',
+    'from_record',
+    'to_record',
+]

@@ -39,12 +39,13 @@ from collections.abc import Callable, Iterator, Sequence
 import rclpy
 from rclpy.node import Node
 
-from ros_pad.bags import BagReader
+from ros_pad.bags import BagReader, topics
 from ros_pad.bags.wire import Wire
 from ros_pad.commands.progress import bar
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import BagError
-from ros_pad.nodes import topics
+from ros_pad.nodes import qos
+from ros_pad.nodes.parameters import LEGS
 from ros_pad.records import COMMAND, PRESSURE, Block
 from ros_pad.regulators.emulate import AlicatEmulator, Emulator
 from studies import command
@@ -203,13 +204,13 @@ class Commander:
     def __enter__(self) -> None:
         rclpy.init(args=[])
         self._node = Node('commander', start_parameter_services=False, enable_rosout=False)
-        self._publisher = topics.COMMAND.publisher(self._node)
+        self._publisher = qos.publisher(self._node, topics.COMMAND)
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._publish, daemon=True)
         self._thread.start()
 
     def _publish(self) -> None:
-        wire, rows = Wire(COMMAND, topics.LEGS), COMMAND.rows(len(topics.LEGS))
+        wire, rows = Wire(COMMAND, LEGS.default), COMMAND.rows(len(LEGS.default))
         rows['setpoint'] = GAUGE
         while not self._end.wait(0.02):
             self._publisher.publish(wire.encode(Block.of(time.time_ns(), rows)))

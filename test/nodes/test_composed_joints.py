@@ -10,12 +10,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from ros_pad import configuration, trials
 from ros_pad.bags import BagReader, annotate
-from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
 from ros_pad.records import ESTIMATE, SAMPLE
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials import replay_body
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay import replay
 
@@ -64,19 +62,6 @@ def test_odom_follows_the_true_body(walked):
     assert miss.max() < 0.03  # of 0.35 m walked
     assert miss.max() > 1e-4  # it is an estimate
     assert np.abs(without.odom[:, 2] - without.body[:, 2]).max() < 0.02
-
-
-def test_feet_are_where_they_truly_are(walked):
-    """In the world of the true body, feet are below the links of the robot."""
-    _, without, _ = walked
-    markers = trials.run(scene_of(3), 'adaptive', seed=2, fidelity='L2')
-    # Both robots stand alike. Markers have noise and ride on sheared pads, up to 1 mm; a tilt that
-    # is off by 0.01 rad moves feet 0.14 m below the body by 1.4 mm.
-    places = [
-        each.position[(each.time > 0.5) & (each.time < 0.999), :, :2]
-        for each in (without, markers)
-    ]
-    assert np.abs(places[0] - places[1]).max() < 3e-3
 
 
 def test_the_bag_has_the_topics_and_their_truths(walked):
@@ -129,17 +114,6 @@ faults:
     bag = BagReader(tmp_path / 'bag')
     _, _, estimates = bag.records({'/feet/estimate': ESTIMATE})['/feet/estimate']
     assert 'no wrench' in {doubts.kind(code) for code in estimates.rows['doubt'][:, 1]}
-
-
-@pytest.mark.parametrize('fidelity', ['L1', 'L0'])
-def test_levels_without_joints_are_refused(fidelity):
-    with pytest.raises(InvalidInput, match=r"'joints'|L0"):
-        trials.run(scene_of(1), 'flat', fidelity=fidelity, sensing='joints')
-
-
-def test_a_rail_leg_has_no_joints():
-    with pytest.raises(InvalidInput, match=r'leg_dry_flat.*needs fidelity L2'):
-        trials.run('leg_dry_flat', 'flat', sensing='joints')
 
 
 def of_the_body(found):
@@ -196,24 +170,3 @@ def test_joints_are_replayed_in_the_order_of_each_message(walked, tmp_path):
     found = replay(turned)
     assert found.verdict == 'equal'
     assert {each.equal for each in of_the_body(found)} == {SAMPLES}
-
-
-def test_a_bag_with_the_joints_of_another_robot_has_a_note(walked, tmp_path):
-    others = rewritten(
-        walked[-1],
-        tmp_path / 'bag',
-        lambda _, values: [f'{each}_' for each in values] if isinstance(values, list) else values,
-    )
-    (note,) = replay(others).notes
-    assert note.startswith('the body estimator is not replayed: joint names without leg_1_coxa')
-
-
-def test_a_bag_without_its_robots_file_is_replayed_but_for_the_body(walked, monkeypatch):
-    def gone(*_):
-        raise ConfigError('mine.yaml: no such file')
-
-    monkeypatch.setattr(replay_body.Robot, 'load', gone)
-    found = replay(BagReader(walked[-1]))
-    assert found.verdict == 'equal'
-    assert found.notes == ['the body estimator is not replayed: mine.yaml: no such file']
-    assert not of_the_body(found)
