@@ -453,29 +453,6 @@ def test_a_path_that_is_unknown_or_given_twice_is_an_error(paths, words):
         FieldReader(TYPES[POINT], paths)
 
 
-def test_fields_beside_lists_and_texts_are_read():
-    message_type = of_type('nav_msgs/msg/Odometry')
-    reader = FieldReader(message_type, [STAMP[0], 'child_frame_id', 'pose.pose.position.z'])
-    message = message_type.blank()
-    for frame, child in (('', ''), ('odom', 'base'), ('odometry', 'κ')):
-        message.header.frame_id, message.child_frame_id = frame, child
-        message.header.stamp.sec, message.pose.pose.position.z = 3, 0.25
-        assert reader(message_type.encode(message)) == (3, child, 0.25)
-    message_type = of_type(JOINT_STATE)
-    reader, message = FieldReader(message_type, STAMP), message_type.blank()
-    for names in ([], ['knee'], ['hip', 'a long name']):
-        message.name, message.position = names, np.arange(float(len(names)))
-        message.header.stamp.nanosec = len(names)
-        data = message_type.encode(message)
-        assert reader(data) == (0, len(names))
-        for size in range(len(data)):
-            with pytest.raises(BadMessage):
-                FieldReader(message_type, STAMP)(data[:size])
-        assert reader.table([data, data]).tolist() == [[0.0, len(names)]] * 2
-    with pytest.raises(ValueError, match='position'):
-        FieldReader(message_type, ['position[0]'])
-
-
 def test_numbers_of_every_kind_are_at_multiples_of_their_size():
     kinds = {
         'bool': True, 'byte': 127, 'int16': -(2**15), 'char': 200, 'int8': -128,

@@ -3,30 +3,16 @@
 
 import contextlib
 import math
-import struct
 import types
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistWithCovarianceStamped
-from helpers import (
-    MS,
-    SECOND,
-    command,
-    encoded,
-    estimate,
-    overrides,
-    position,
-    pressure,
-    sample,
-    wrench,
-)
+from helpers import MS, SECOND, command, estimate, position, pressure, sample, wrench
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rclpy._rclpy_pybind11 import RCLError  # rclpy has no public name for it
 from rclpy.logging import LoggingSeverity, set_logger_level
-from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Header
@@ -34,7 +20,7 @@ from std_srvs.srv import Trigger
 
 from ros_pad.bags import topics
 from ros_pad.errors import TransportError
-from ros_pad.nodes import qos, regulator
+from ros_pad.nodes import regulator
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.merge import MergeNode
@@ -345,10 +331,9 @@ pressures = records_of(topics.PRESSURE, usual_pressures)
 
 
 @pytest.mark.parametrize('simulated', [False, True])
-@pytest.mark.parametrize('moment_noise', [0.0, 0.01])
-def test_the_estimator_survives_and_estimates_what_is_possible(bench, moment_noise, simulated):
+def test_the_estimator_survives_and_estimates_what_is_possible(bench, simulated):
     node = bench.start(
-        EstimatorNode, publish_rate=1000.0, moment_noise=moment_noise, use_sim_time=simulated
+        EstimatorNode, publish_rate=1000.0, moment_noise=0.01, use_sim_time=simulated
     )
 
     def check(node):
@@ -467,44 +452,3 @@ def test_merge_survives_and_joins_what_is_possible(bench, monkeypatch):
 
     behave()
     assert node.refused
-
-
-TORN = (
-    b'', b'\0\1\0\0', b'\0\1\0\0' + b'\1' * 10, b'\7' * 40,
-    struct.pack('<4xiII', 1, 2, 0x7FFFFFFF) + b'abc', struct.pack('<4xI4s', 4, b'\xff\xfe\xc3\0'),
-)  # fmt: skip
-
-
-def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
-    """Through DDS, which may look into them."""
-    kinds = (RegulatorNode, EstimatorNode, ControllerNode, MergeNode, ViewsNode)
-    one = overrides({'legs': [1, 2]})
-    nodes = [kind(context=context, parameter_overrides=one) for kind in kinds]
-    attacker = Node('attacker', context=context)
-    for node in (*nodes, attacker):
-        executor.add_node(node)
-    heard = []
-    qos.subscription(attacker, topics.PRESSURE, heard.append)
-    published = [(topic, None) for topic in topics.RECORDS if topic is not topics.FORCE]
-    published += [(topic, 1) for name, topic in DRIVERS.items() if 'pressure' not in name][:2]
-    for topic, leg in published:
-        publisher = qos.publisher(attacker, topic, leg)
-        until(publisher.get_subscription_count)
-        for data in TORN:
-            # In one process the error may be raised here; later pressures must still arrive.
-            with contextlib.suppress(RCLError):
-                publisher.publish(data)
-            count = len(heard)
-            until(lambda count=count: len(heard) > count, what='a pressure')  # the node goes on
-        attacker.destroy_publisher(publisher)
-    publisher = qos.publisher(attacker, topics.SAMPLE)
-    until(lambda: publisher.get_subscription_count() == 2)
-    channel = nodes[0].supervision.channels[0]
-
-    def answered():
-        now_ns = attacker.get_clock().now().nanoseconds
-        publisher.publish(encoded(topics.SAMPLE, sample(now_ns), (1, 2)))
-        return channel.answers.accepted
-
-    until(answered, what='a set-point after a sound sample')
-    assert channel.answers.accepted

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -17,7 +16,6 @@ from helpers import MS, SECOND, SIX, encoded, header, overrides
 from helpers import record as record_of
 from rcl_interfaces.msg import Parameter as RosParameter
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -38,12 +36,9 @@ KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 QUIET = {'start_parameter_services': False, 'enable_rosout': False}
 
 
-@pytest.fixture(
-    params=[pytest.param(SingleThreadedExecutor, marks=pytest.mark.slow), EventsExecutor],
-    ids=['single', 'events'],
-)
-def executor(request, context):
-    executor = request.param(context=context)
+@pytest.fixture
+def executor(context):
+    executor = EventsExecutor(context=context)
     yield executor
     for node in list(executor.get_nodes()):
         executor.remove_node(node)
@@ -292,7 +287,6 @@ def test_a_node_that_comes_back_before_its_name_is_dropped_is_asked_again(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
 def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     driver = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     publisher = robot.create_publisher(PoseStamped, 'body/pose', driver)
@@ -414,7 +408,6 @@ def start(*parameters):
 
 
 @pytest.mark.parametrize('number_of_signal', [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
 def test_signals_close_the_bag(number_of_signal, robot, until, tmp_path):
     publisher = robot.create_publisher(JointState, 'feet/estimate', KEPT)
     folder = tmp_path / 'trial'
@@ -439,16 +432,3 @@ def test_signals_close_the_bag(number_of_signal, robot, until, tmp_path):
     _, _, values = wetness_in(folder)
     assert values[:100] == list(map(float, range(100)))
     assert set(values[100:]) == {100.0}
-
-
-def test_exit_status_depends_on_the_error(tmp_path):
-    (tmp_path / 'trial').mkdir()
-    for parameter, status, message in [
-        (f'folder:={tmp_path / "trial"}', 1, 'exists already, and bags are never overwritten'),
-        ('legs:=[9]', 2, r'legs = \[9\] is not allowed'),
-        ('legs:=all', 2, 'legs'),
-    ]:
-        process = start(parameter, *([] if 'folder' in parameter else ['folder:=/nonexistent/x']))
-        _, errors = process.communicate(timeout=120)
-        assert (process.returncode, bool(re.search(message, errors))) == (status, True), errors
-        assert 'Traceback' not in errors
