@@ -16,6 +16,7 @@ from helpers import MS, SECOND, SIX, encoded, header, overrides
 from helpers import record as record_of
 from rcl_interfaces.msg import Parameter as RosParameter
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -143,6 +144,23 @@ def test_what_is_no_record_is_kept_and_reported(robot, record, until, tmp_path):
     ((_, message, _),) = BagReader(tmp_path / 'trial').messages()
     assert list(message.name) == ['knee']
     assert recorder.refused == {'/feet/sample': 1}
+
+
+def test_what_has_arrived_is_written_at_the_end(context, robot, record, until, tmp_path):
+    """The recorder takes messages ten times a second; here it ends before it does."""
+    recorder = record()
+    publisher, heard = qos.publisher(robot, topics.ESTIMATE), []
+    qos.subscription(robot, topics.ESTIMATE, heard.append)
+    until(lambda: publisher.get_subscription_count() == 2)
+    other = SingleThreadedExecutor(context=context)  # the recorder is not spun any more
+    recorder.executor.remove_node(robot)
+    other.add_node(robot)
+    while len(heard) < 20:
+        publisher.publish(wetness(1))
+        other.spin_once(timeout_sec=0.1)
+    other.remove_node(robot)
+    recorder.close()
+    assert BagReader(tmp_path / 'trial').counts['/feet/estimate'] > 0
 
 
 def test_what_was_latched_before_is_recorded(robot, record, until, tmp_path):
