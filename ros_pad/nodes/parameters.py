@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of nodes: a table for each node, from which descriptors, YAML and docs are made."""
+"""Parameters of nodes: a table for each node, from which descriptors and YAML are made."""
 
 from __future__ import annotations
 

@@ -115,6 +115,8 @@ class ViewsNode(PadNode):
         self._places[known] = rows['position'][known]
         if not self._markers_pace.due(block.last_ns):
             return
+        if self.refused and self.due(block.last_ns):
+            self.report(block.last_ns, [])
         array = ARRAY.blank()
         for leg, place, wetness in zip(
             self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True

@@ -291,7 +291,7 @@ def test_no_messages_stop_the_node_and_nothing_that_is_not_finite_is_published(r
     """Afterwards it estimates a robot that stands; its clock may have been set back."""
     node = robot.start(use_sim_time=simulated)
 
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=25, deadline=None)
     @given(sequence=messages)
     def survives(sequence):
         robot.bench.sent.clear()

@@ -6,8 +6,6 @@ import dataclasses
 import math
 import os
 import signal
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -270,36 +268,6 @@ def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
     assert 2.5 < trial.metrics.duration_s < 2.8
     assert signal.getsignal(signal.SIGTERM) is before
     check_vented(tmp_path / 'bag')
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
-    arguments = ['run', 'hexapod_patches', '--cycles', '300', '--policy', 'dome']
-    out = tmp_path / 'out'
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'ros_pad.cli', *arguments, '--out', str(out)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        deadline = time.monotonic() + 300.0
-
-        def recorded():
-            return sum(file.stat().st_size for file in out.glob('bag/*.mcap'))
-
-        while recorded() < 200_000 and process.poll() is None:
-            assert time.monotonic() < deadline, 'the bag does not grow'
-            time.sleep(0.05)
-        process.send_signal(number)
-        _, errors = process.communicate(timeout=300)
-    finally:
-        process.kill()
-    assert process.returncode == 130, errors
-    assert 'pads vented, bag closed' in errors
-    assert 'Traceback' not in errors
-    check_vented(out / 'bag')
 
 
 class Hasty:

@@ -5,11 +5,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from ros_pad import configuration, trials
-from ros_pad.bags import BagReader, annotate
+from ros_pad.bags import BagReader
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
 from ros_pad.records import ESTIMATE, SAMPLE
@@ -138,35 +136,3 @@ def test_a_replay_of_the_bag_is_equal_to_the_bit(walked):
     # Without the velocities it is another estimate: nothing of markers is in this bag.
     settings = NodeSettings.of(bag).changed({'alarm.threshold': 1.0})
     assert replay(bag, settings).verdict == 'different'
-
-
-def rewritten(path, folder, change):
-    """Copy a bag with other messages of the joints; ``change`` gets their number and lists."""
-    made = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
-    with AnyReader([path]) as reader, made as bag:
-        connections, count = {}, 0
-        for connection, ns, data in reader.messages():
-            if connection.topic not in connections:
-                connections[connection.topic] = bag.add_connection(
-                    connection.topic, connection.msgtype,
-                    msgdef=connection.msgdef.data, rihs01=connection.digest,
-                )  # fmt: skip
-            if connection.topic == '/joint_states':
-                message = reader.deserialize(data, connection.msgtype)
-                for part in ('name', 'position', 'velocity', 'effort'):
-                    setattr(message, part, change(count, getattr(message, part)))
-                data = reader.typestore.serialize_cdr(message, connection.msgtype)
-                count += 1
-            bag.write(connections[connection.topic], ns, data)
-    annotate(folder, BagReader(path).custom_data)
-    return BagReader(folder)
-
-
-def test_joints_are_replayed_in_the_order_of_each_message(walked, tmp_path):
-    def turn(count, values):
-        return values if count % 2 else values[::-1].copy()
-
-    turned = rewritten(walked[-1], tmp_path / 'bag', turn)
-    found = replay(turned)
-    assert found.verdict == 'equal'
-    assert {each.equal for each in of_the_body(found)} == {SAMPLES}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import importlib
+import inspect
 import math
 import re
 
@@ -14,6 +15,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.parameters import FOOT, LEGS, Parameter, declare
 from ros_pad.nodes.process import run
+from ros_pad.regulators import SimulatedRegulator
 
 NODES = [
     'simulator', 'body_estimator', 'estimator', 'controller', 'regulator', 'recorder', 'merge',
@@ -57,6 +59,16 @@ def test_the_shipped_file_describes_each_key(name):
         assert over[1] == f'{parameter.description} ({parameter.allowed}{live})'
         assert parameter.description.endswith('.')
         assert parameter.unit in over[1]
+
+
+def test_the_shipped_file_has_every_option_of_the_simulated_backend():
+    options = inspect.signature(SimulatedRegulator).parameters.values()
+    described = dict(re.findall(r'^#     backend_options\.(\w+):(.*)$', FILE.read_text(), re.M))
+    assert described == {
+        each.name: '' if each.default is None or each.name == 'pad_volume' else f' {each.default}'
+        for each in options
+        if each.name not in ('clock', 'ceiling')
+    }
 
 
 @pytest.fixture

@@ -458,17 +458,6 @@ def test_each_fault_is_reported_within_a_second(robot, case):
     assert np.isnan(rows['pressure']).any() == (case == 'silence')
 
 
-def test_records_have_the_true_pressure_of_a_pad_beside_a_wrong_one(robot):
-    """The device controls what it measures, which is 30 kPa too much."""
-    drift = '{kind: sensor_drift, legs: [1], start: 0.5, offset: 3.0e4}'
-    robot.start(**{'backend_options.faults': [drift]})
-    robot.hold(1.5, 60e3, 60e3)
-    wrong, right = robot.pressures[-1]
-    assert wrong['pressure'] == pytest.approx(60e3, abs=500.0)
-    assert wrong['pad'] == pytest.approx(30e3, abs=500.0)
-    assert right['pad'] == right['pressure']
-
-
 def test_a_low_supply_has_a_status_of_its_own(robot):
     robot.start(**{'backend_options.faults': ['{kind: supply_loss, start: 1.0}']})
     robot.hold(2.8, 60e3, 50e3)
