@@ -177,11 +177,11 @@ def bridge(
 def _in_si(found: Bridge, size: float, tension: float) -> Bridge:
     """Convert a bridge from units of sphere radius and surface tension to SI units."""
     units = (tension * size, tension / size, size**3, size, 1.0, size, size)
-    values = [
-        plain(getattr(found, each.name) * unit)
+    values: dict[str, Any] = {
+        each.name: plain(getattr(found, each.name) * unit)
         for each, unit in zip(dataclasses.fields(Bridge), units, strict=False)
-    ]
-    return Bridge(*values, found.status if np.ndim(found.status) else str(found.status))
+    }
+    return Bridge(**values, status=found.status if np.ndim(found.status) else str(found.status))
 
 
 def _cap(beta: Floats) -> Floats:
