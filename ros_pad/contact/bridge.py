@@ -153,8 +153,8 @@ def bridge(
     weight = number('density', density, 'kg/m³', above=True) * fall
     if (filling_angle is None) == (volume is None):
         raise InvalidInput(
-            f'filling_angle = {filling_angle!r} and volume = {volume!r} are not allowed: exactly one'
-            ' of them is needed'
+            f'filling_angle = {filling_angle!r} and volume = {volume!r} are not allowed: exactly'
+            ' one of them is needed'
         )
     check: Callable[..., Any] = quantity if circle and volume is None else number
     theta = check('contact_angle', contact_angle, 'rad', high=math.pi)
@@ -177,11 +177,11 @@ def bridge(
 def _in_si(found: Bridge, size: float, tension: float) -> Bridge:
     """Convert a bridge from units of sphere radius and surface tension to SI units."""
     units = (tension * size, tension / size, size**3, size, 1.0, size, size)
-    values = [
-        plain(getattr(found, each.name) * unit)
+    values: dict[str, Any] = {
+        each.name: plain(getattr(found, each.name) * unit)
         for each, unit in zip(dataclasses.fields(Bridge), units, strict=False)
-    ]
-    return Bridge(*values, found.status if np.ndim(found.status) else str(found.status))
+    }
+    return Bridge(**values, status=found.status if np.ndim(found.status) else str(found.status))
 
 
 def _cap(beta: Floats) -> Floats:
@@ -637,22 +637,28 @@ def _settled(case: _Case, along: Array, state: Array, known: Array) -> Any:
     """
     from scipy.integrate import solve_bvp
 
+    # Each length is compared with its own size.
+    unit = np.array([1.0, state[1, -1], state[2, -1], abs(state[3]).max()])[:, None]
+
     def rates(_: Array, state: Array, known: Array) -> Array:
-        phi, radius, height, _ = state
+        phi, radius, height, _ = state * unit
         pressure, length, _ = known
         sine = np.sin(phi)
         bend = pressure - case.bond * height - sine / radius
-        return length * np.stack([bend, np.cos(phi), sine, math.pi * radius**2 * sine])
+        return length * np.stack([bend, np.cos(phi), sine, math.pi * radius**2 * sine]) / unit
 
     def misses(low: Array, high: Array, known: Array) -> Array:
-        beta, held = known[2], high[3]
+        low, high, beta = low * unit[:, 0], high * unit[:, 0], known[2]
+        held = high[3]
         given = beta / case.beta if case.volume is None else held / case.volume
         on_plane = low[[0, 2, 3]] - (math.pi - case.plane, 0.0, -_cap(beta))
         on_sphere = high[:3] - (beta + case.theta, np.sin(beta), case.gap + _rise(beta))
-        return np.array([*on_plane, *on_sphere, given - 1.0])
+        off = np.concatenate([on_plane / unit[[0, 2, 3], 0], on_sphere / unit[:3, 0]])
+        return np.append(off, given - 1.0)
 
     with np.errstate(all='ignore'):
-        found = solve_bvp(rates, misses, along, state, known, tol=1e-9, max_nodes=3000)
+        found = solve_bvp(rates, misses, along, state / unit, known, tol=1e-10, max_nodes=10000)
+    found.y = found.y * unit
     near = found.success and abs(found.sol(along)[0] - state[0]).max() < 0.5
     sensible = found.y[1].min() > 0.0 and found.p[1] > 0.0 and 0.0 < found.p[2] < math.pi
     return found if near and sensible else None

@@ -248,8 +248,7 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
         speed = (angle + start) * (across / strain)
         return np.concatenate([speed, *(speed * d for d in rates(angle, run, along, across))])
 
-    zero = np.zeros_like(strain)
-    state = np.concatenate([zero, zero, strain, strain, zero, zero])
+    state = np.outer([0.0, 0.0, 1.0, 1.0, 0.0, 0.0], strain).ravel()
     root = np.sqrt(strain)
     scale = tolerance * np.concatenate([root, root, strain, strain, strain, strain**2])
     options: dict[str, Any] = {'method': 'DOP853', 'rtol': tolerance, 'atol': scale}
