@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ros_pad.configuration import choice, instance, number
 from ros_pad.errors import InvalidInput
-from ros_pad.robots import Kinematics, Robot
+from ros_pad.robots import Chains, Kinematics, Robot
 from ros_pad.robots.rotation import Array, cross, quaternion, rotation, skew
 from ros_pad.sensing.body_filter import GATE, GRAVITY, BodyFilter, Flags
 from ros_pad.sensing.motion import (
@@ -103,7 +103,18 @@ are not independent."""
 
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
 FOOT_NOISE = 1e-4  # m: kinematics that are not quite right
-DAMPING = 1e-4  # m²: keeps forces finite where the leg is straight
+
+
+def forces_of(chains: Chains, kinematics: Kinematics, efforts: Array, gravity: Array) -> Array:
+    """Return the forces of the ground on the feet, (..., legs, 3), N, from joint torques, N m.
+
+    ``gravity``, (3,), m/s², is in the axes of the kinematics.
+    """
+    lines = kinematics.jacobians
+    holding = chains.gravity_torques(kinematics, gravity)
+    # 1e-4 m² keeps forces finite where the leg is straight.
+    square = lines @ lines.swapaxes(-1, -2) + 1e-4 * np.eye(3)
+    return np.asarray(np.linalg.solve(square, lines @ (holding - efforts)[..., None])[..., 0])
 
 
 class BodyEstimator:
@@ -354,10 +365,7 @@ class BodyEstimator:
             return np.asarray(given @ self._robot.imu[:3, :3])
         # The specific force has weight and inertia of the legs in one, as far as they move with
         # the body.
-        lines = kinematics.jacobians
-        holding = self._robot.chains.gravity_torques(kinematics, -accelerometer)
-        square = lines @ lines.transpose(0, 2, 1) + DAMPING * np.eye(3)
-        return np.asarray(np.linalg.solve(square, lines @ (holding - given)[..., None])[..., 0])
+        return forces_of(self._robot.chains, kinematics, given, -accelerometer)
 
     def _begin(self, time: float, gyro: Array, accelerometer: Array, dq: Array) -> None:
         """Begin with the base at the origin, heading along x, tilted as the IMU shows."""

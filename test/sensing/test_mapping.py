@@ -307,7 +307,7 @@ def test_what_drivers_leave_out_is_no_reading(tmp_path):
 @pytest.mark.parametrize(
     ('changes', 'words'),
     [
-        ({'names': ['abad', *GO2.joint_names[1:11], 'RR_calf']}, "'RR_calf' this joint"),
+        ({'names': ['abad', *GO2.joint_names[1:11], 'RR_calf']}, "'RR_calf_joint' is not among"),
         ({'degrees': [90.0] * 11}, 'positions of 11 joints'),
         ({'degrees': [90.0] * 11 + [float('nan')]}, '12 finite numbers'),
         ({'names': None}, 'joints'),
@@ -392,7 +392,7 @@ def test_files_that_are_not_valid(old, new, words, tmp_path):
 @pytest.mark.parametrize(
     ('old', 'new', 'words'),
     [
-        ('reversed: [FL_calf_joint]', 'reversed: [FL_calf]', "did you mean 'FL_calf_joint'"),
+        ('reversed: [FL_calf_joint]', 'reversed: [FL_calf]', "Did you mean 'FL_calf_joint'"),
         ('names: names', 'order: [a, b]', "joint 'abad' is not among a, b"),
         ('names: names', '', 'either names or order'),
     ],
@@ -412,8 +412,8 @@ def test_places_of_feet_need_legs_that_slide():
     ('legs', 'words'),
     [
         ('[front_left, RL]', None),
-        ('[FL, front_left]', 'each leg is allowed once'),
-        ('[FL, left]', "'left' is not allowed: one of FL, FR, RL, RR, or of front_left"),
+        ('[FL, front_left]', 'different ones'),
+        ('[FL, left]', "'left' is not allowed: different ones of FL"),
     ],
 )
 def test_legs_by_name_or_corner(legs, words, tmp_path):
