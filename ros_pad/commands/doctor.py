@@ -158,14 +158,16 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(counts | {'findings': [asdict(each) for each in found]}))
         return 1 if counts['problems'] else 0
     width = min(shutil.get_terminal_size().columns, WIDEST)
+    # Paths and settings are not broken, so that they can be copied.
+    wrapper = textwrap.TextWrapper(
+        width, subsequent_indent=' ' * 12, break_long_words=False, break_on_hyphens=False
+    )
     for each in found:
         for line in (
             f'{each.status:8} {each.what}: {each.found}',
             *([f'{"":9}-> {each.advice}'] if each.advice else []),
         ):
-            # Paths and settings are not broken, so that they can be copied.
-            whole = {'break_long_words': False, 'break_on_hyphens': False}
-            print(textwrap.fill(line, width, subsequent_indent=' ' * 12, **whole))
+            print(wrapper.fill(line))
     print('\n' + ', '.join(f'{status}: {count}' for status, count in counts.items()))
     return 1 if counts['problems'] else 0
 
@@ -342,7 +344,7 @@ def loopback(patience: float = LOOPBACK) -> Finding:
         for end in ('subscriber', 'publisher')
     ]  # fmt: skip
     # A process may hang without output, for example at a lock that a killed process has left.
-    limit = threading.Timer(STARTING, lambda: [child.kill() for child in children])
+    limit = threading.Timer(STARTING, lambda: [*map(subprocess.Popen.kill, children)])
     limit.start()
     text = f'no message from one process to another within {patience:g} s: separate nodes do not'
     text += ' find one another (pad run without --live does not need it)'

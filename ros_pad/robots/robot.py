@@ -21,21 +21,21 @@ from ros_pad.robots.chains import Chains, Joint, Kinematics
 from ros_pad.robots.gait import Gait
 from ros_pad.robots.rotation import Array, from_rpy, transform
 
+# Fewest and most legs of a robot.
 LEGS = (3, 8)
-"""Fewest and most legs of a robot."""
 
+# Depth by which a robot would sink if one leg carried all of it, m, where a file does not give
+# the stiffness of its legs.
 SAG = 7e-3
-"""Depth by which a robot would sink if one leg carried all of it, m, where a file does not give
-the stiffness of its legs."""
 
+# Longest leg, and largest distance of a place on a link from its joint, m.
 LONGEST = 5.0
-"""Longest leg, and largest distance of a place on a link from its joint, m."""
 
+# Shortest leg, m.
 SHORTEST = 5e-3
-"""Shortest leg, m."""
 
+# Largest mass of a robot, kg.
 HEAVIEST = 2000.0
-"""Largest mass of a robot, kg."""
 
 _METRES, _KILOGRAMS = 'm (not mm)', 'kg (not g)'  # of a file in other units, values are refused
 _DOWN = np.array((0.0, 0.0, -9.81))

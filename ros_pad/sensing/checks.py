@@ -360,7 +360,9 @@ def _fit(recording: Recording) -> tuple[Array, Array]:
     rate = recording.mean(recording.rate())[first]
     lines = (skew(arm)[..., None] * rate[:, None, None]).reshape(-1, 9)
     matrix = np.linalg.lstsq(lines, drift.ravel(), rcond=None)[0]
-    return matrix.reshape(3, 3), _sizes(drift - (lines @ matrix).reshape(-1, 3))
+    return np.asarray(matrix.reshape(3, 3), dtype=float), _sizes(
+        drift - (lines @ matrix).reshape(-1, 3)
+    )
 
 
 def _errors(recording: Recording, turn: Array | None = None, late: float = 0.0) -> Array:
@@ -494,7 +496,7 @@ def _horizontal(recording: Recording) -> list[Check]:
     total, wanted = _pushes(recording)
     if len(total) < FEWEST:
         return []
-    turn = _turn(np.linalg.lstsq(total, wanted, rcond=None)[0])
+    turn = _turn(np.asarray(np.linalg.lstsq(total, wanted, rcond=None)[0], dtype=float))
     before, after = _sizes(total - wanted), _sizes(total @ turn - wanted)
     if after.mean() >= 0.7 * before.mean() or _sure(before, after) <= SURE:
         return []

@@ -420,9 +420,8 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
                 raise InvalidInput(
                     f'{kind} of {len(values)} joints are not allowed: {len(given)} are needed'
                 )
-            found[kind] = _finite(values[last[given]], len(known)) * (signs * scales[kind])
-            if kind == 'positions':
-                found[kind] = found[kind] + offsets
+            read_out = _finite(values[last[given]], len(known)) * (signs * scales[kind])
+            found[kind] = read_out + offsets if kind == 'positions' else read_out
         return found
 
     return read, tuple(fields)

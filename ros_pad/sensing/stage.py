@@ -22,39 +22,40 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array, matrix, skew
 from ros_pad.sensing.estimator import UNKNOWN_BIAS, WEIGHT, BodyEstimate, BodyEstimator
 
+# Difference of time stamps up to which readings are of one moment, ns: joints 4 ms later than the
+# IMU triple the error of the body's velocity.
 SAME_NS = 1_000_000
-"""Difference of time stamps up to which readings are of one moment, ns: joints 4 ms later than the
-IMU triple the error of the body's velocity."""
 
+# Difference of the stamps of IMU and joints above which they cannot be paired, ns.
 APART_NS = 5_000_000
-"""Difference of the stamps of IMU and joints above which they cannot be paired, ns."""
 
+# Age above which the force of a foot is not used any more, ns.
 OLDEST_FORCE_NS = 20_000_000
-"""Age above which the force of a foot is not used any more, ns."""
 
+# Longest time over which positions of joints are differentiated, s.
 LONGEST_DIFFERENCE = 0.05
-"""Longest time over which positions of joints are differentiated, s."""
 
+# Step back of a stamp from which on a clock has been set back, ns; less is a late message.
 SET_BACK_NS = 100_000_000
-"""Step back of a stamp from which on a clock has been set back, ns; less is a late message."""
 
+# Longest time for which the first sample waits until the robot is calm, s: one reading in a jolt
+# would begin odom with a wrong tilt.
 START = 0.2
-"""Longest time for which the first sample waits until the robot is calm, s: one reading in a jolt
-would begin odom with a wrong tilt."""
 
+# Readings in a row that are calm before estimation begins.
 CALM = 5
-"""Readings in a row that are calm before estimation begins."""
 
+# Largest difference of the specific force from gravity, m/s², and largest rates of body and
+# joints, rad/s, of a calm robot.
 _CALM_PULL, _CALM_RATE, _CALM_JOINTS = 0.5, 0.1, 0.3
-"""Largest difference of the specific force from gravity, m/s², and largest rates of body and
-joints, rad/s, of a calm robot."""
 
+# Time without a sample after which there is a doubt, s.
 SILENCE = 0.4
-"""Time without a sample after which there is a doubt, s."""
 
+# Sources of the forces: sensors of the feet, efforts of the joints, or the first that comes.
 FORCES = ('auto', 'feet', 'efforts')
-"""Sources of the forces: sensors of the feet, efforts of the joints, or the first that comes."""
 
+# Settings of a body estimator and its stage, by the names of their arguments.
 SETTINGS = (
     Setting(
         'gyro_noise', 0.005, 'Standard deviation of a sample of the gyro.', 'rad/s', 1e-6, 1.0
@@ -99,7 +100,6 @@ SETTINGS = (
     Setting('window', 0.02, 'Time over which slip velocities are averaged.', 's', 0.0, 1.0),
     Setting('rate', 250.0, 'Samples a second that are expected.', 'Hz', 10.0, 1e4),
 )  # fmt: skip
-"""Settings of a body estimator and its stage, by the names of their arguments."""
 
 _Values: TypeAlias = Sequence[float] | npt.NDArray[np.float64]
 

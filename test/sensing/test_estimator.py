@@ -11,7 +11,6 @@ from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import from_rpy, transform
 from ros_pad.sensing import BodyEstimator
-from ros_pad.sensing.plausibility import Shift
 
 DT = 0.004
 UP = np.array((0.0, 0.0, 9.81))
@@ -313,7 +312,6 @@ def test_bad_readings_are_refused_and_change_nothing(index, value, message):
         ({'force_axes': 'world'}, 'force_axes'),
         ({'radius_error': -0.1}, 'radius_error'),
         ({'length_error': 0.6}, 'length_error'),
-        ({'joint_delay': 0.1}, 'joint_delay'),
     ],
 )
 def test_arguments_that_are_not_allowed(arguments, message):
@@ -379,15 +377,6 @@ def test_joints_whose_velocity_is_not_theirs_are_named():
             STANDING,
         )
     assert found.doubt == 'joints: the position of RL_thigh_joint does not follow its velocity'
-
-
-def test_readings_wait_for_joints_that_are_late():
-    shift = Shift(0.006)
-    ticks = [DT * tick for tick in range(20)]
-    found = [shift.update(time, [np.array((time, 2.0 * time))]) for time in ticks]
-    for time, (values,) in list(zip(ticks, found, strict=True))[5:]:
-        assert values == pytest.approx([time - 0.006, 2.0 * (time - 0.006)])
-    assert shift.update(-1.0, [np.zeros(2)])[0] == pytest.approx(np.zeros(2))
 
 
 @pytest.mark.parametrize(('rate', 'kind'), [(50.0, ''), (25.0, 'rate')])
