@@ -156,20 +156,22 @@ def run(options: argparse.Namespace) -> int:
     }
     if options.json:
         print(json.dumps(counts | {'findings': [asdict(each) for each in found]}))
-        return 1 if counts['problems'] else 0
-    width = min(shutil.get_terminal_size().columns, WIDEST)
+    else:
+        for each in found:
+            _show(each)
+        print('\n' + ', '.join(f'{status}: {count}' for status, count in counts.items()))
+    return 1 if counts['problems'] else 0
+
+
+def _show(finding: Finding) -> None:
     # Paths and settings are not broken, so that they can be copied.
     wrapper = textwrap.TextWrapper(
-        width, subsequent_indent=' ' * 12, break_long_words=False, break_on_hyphens=False
-    )
-    for each in found:
-        for line in (
-            f'{each.status:8} {each.what}: {each.found}',
-            *([f'{"":9}-> {each.advice}'] if each.advice else []),
-        ):
-            print(wrapper.fill(line))
-    print('\n' + ', '.join(f'{status}: {count}' for status, count in counts.items()))
-    return 1 if counts['problems'] else 0
+        min(shutil.get_terminal_size().columns, WIDEST), subsequent_indent=' ' * 12,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+    print(wrapper.fill(f'{finding.status:8} {finding.what}: {finding.found}'))
+    if finding.advice:
+        print(wrapper.fill(f'{"":9}-> {finding.advice}'))
 
 
 def examine() -> Iterator[Finding]:

@@ -38,7 +38,7 @@ def one(findings: Any) -> Finding:
 
 @pytest.mark.parametrize(
     ('version', 'status'),
-    [((3, 10, 4), 'problem'), ((3, 11, 0), 'ok'), ((3, 14, 0), 'warning')],
+    [((3, 10, 4), 'problem'), ((3, 11, 0), 'ok')],
 )
 def test_python(version: tuple[int, ...], status: str):
     assert one(doctor.python(version)).status == status
@@ -86,19 +86,6 @@ def test_a_missing_package_is_named_and_the_doctor_goes_on(missing: str, tmp_pat
     assert f'{missing} (ModuleNotFoundError' in found['packages']['found']
     assert 'pip install' in found['packages']['advice']
     assert found['logs']['status'] == 'ok'  # the last check still runs
-
-
-def test_broken_and_missing_packages_are_named(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / 'broken_pad.py').write_text('raise OSError("libgfortran.so.5")')
-    (tmp_path / 'half_pad.py').write_text('import not_there_pad')
-    monkeypatch.syspath_prepend(str(tmp_path))
-    finding = one(doctor.packages(['json', 'nowhere_pad', 'half_pad', 'broken_pad']))
-    assert finding.status == 'problem'
-    for part in ('nowhere_pad', 'not_there_pad', 'broken_pad (OSError: libgfortran.so.5)'):
-        assert part in finding.found
-    assert 'json' not in finding.found
 
 
 def test_extras_that_cannot_be_imported_say_why(
@@ -222,20 +209,6 @@ def test_processes_that_are_kept_apart_are_a_problem(alone: pytest.MonkeyPatch):
     finding = doctor.loopback(1.0)
     assert finding.status == 'problem' and 'within 1 s' in finding.found
     assert 'ROS_AUTOMATIC_DISCOVERY_RANGE' in finding.advice
-
-
-def test_nodes_that_hang_are_not_waited_for(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / 'rclpy.py').write_text('import time; time.sleep(3600)')
-    monkeypatch.setattr(doctor, 'STARTING', 0.5)
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    monkeypatch.syspath_prepend(str(tmp_path))
-    imported = one(doctor.ros())
-    assert imported.status == 'problem' and 'within 0.5 s' in imported.found
-    started = doctor.loopback(0.5)
-    assert started.status == 'problem' and 'does not start' in started.found
-    assert 'shm clean' in started.advice
 
 
 def test_serial_ports(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
