@@ -13,7 +13,7 @@ from ros_pad import configuration
 from ros_pad.bags import BagReader
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.sensing import BodyEstimator, Mapping, SensingStage
+from ros_pad.sensing import BodyEstimator, Mapping
 from studies.sensing import layouts
 
 GO2 = Robot.load('go2')
@@ -125,25 +125,6 @@ def test_joint_states_and_wrenches_give_the_estimate_of_the_arrays(tmp_path):
         log().foot_forces,
     )
     same(estimates(found, GO2, force_axes=mapping.force_axes), expected, 1e-9)
-
-
-def test_a_stage_takes_the_readings(tmp_path):
-    streams = [layouts.imu(log()), layouts.joint_states(log(), GO2.joint_names)]
-    mapping, found = readings(tmp_path, 'default', GO2, *streams)
-    made, wrong = [], []
-    estimator = BodyEstimator(GO2, force_axes=mapping.force_axes)
-    stage = SensingStage(
-        GO2, estimator, lambda _, each: made.append(each), lambda _: None, wrong.append
-    )
-    for each in found:
-        each.pass_to(stage)
-    # Estimation begins when the robot is calm, after a few readings.
-    assert len(made) > 740
-    assert wrong == []
-    assert stage.force_source == 'efforts'
-    errors = [each.velocity for each in made[-250:]] - log().velocity[-250:]
-    # 8 mm/s is what the body estimator must reach on a dry floor.
-    assert np.sqrt(np.square(errors[:, :2]).sum(1).mean()) < 0.008
 
 
 def test_low_state_of_a_go2(tmp_path):

@@ -232,15 +232,6 @@ def test_bad_readings_are_refused_and_leave_no_trace(spoil, named):
                for each in watched.used)  # fmt: skip
 
 
-def test_only_bad_readings_become_the_doubt():
-    watched = Watched()
-    for ms in range(4, 600, 4):
-        watched.imu(ms, math.nan)
-        watched.joints(ms)
-        watched.stage.tick(ms * MS)
-    assert watched.stage.doubt.startswith('reading refused: gyro = nan')
-
-
 def test_readings_that_come_twice_or_late_count_once():
     watched = Watched()
     watched.sample(4)
