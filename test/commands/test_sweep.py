@@ -126,7 +126,7 @@ def test_a_sweep_leaves_table_picture_and_summary(tmp_path, capsys, monkeypatch)
     assert point['distance_per_cycle_m'] == pytest.approx(sum(ways) / 2)
     # The second time no trial is repeated (times differ), and the result is printed again.
     before = (out / 'trials.csv').read_bytes()
-    monkeypatch.setattr('ros_pad.trials.sweep.execution.finished', nothing_to_do)
+    monkeypatch.setattr('ros_pad.trials.sweep.execution._finished', nothing_to_do)
     assert cli.main([*arguments, '--out', str(out)]) == 0
     said = capsys.readouterr().out
     assert 'mm/cycle' in said and str(out / 'trials.csv') in said
