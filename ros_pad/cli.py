@@ -45,14 +45,8 @@ _DESCRIPTION = """\
 Feet with inflatable pads for legged robots: simulate, record, analyse.
 All values are in SI units; pressures are gauge."""
 _EPILOG = """\
-exit status:
-  0    done
-  1    a failure at run time (such as no equilibrium, a device that does not
-       answer, a full disk), a replay that differs, failed trials, or a
-       problem that pad doctor found
-  2    bad usage or input: an option, scene, foot, table or bag that is
-       missing or not valid
-  130  stopped by Ctrl-C or SIGTERM
+exit status: 0 done; 1 a failure at run time, a replay that differs, failed trials, or a problem
+that pad doctor found; 2 bad usage or input; 130 stopped by Ctrl-C or SIGTERM
 
 example:
   pad run hexapod_patches --seed 3

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from ros_pad.errors import InvalidInput
 
@@ -72,14 +72,6 @@ class Pace:
         return True
 
 
-class Rate(NamedTuple):
-    """Wanted and reached samples a second, Hz, and speed, times real time."""
-
-    wanted: float
-    reached: float
-    speed: float
-
-
 class RealTime:
     """Follow a clock in periods, and measure how well that is kept up with.
 
@@ -110,13 +102,8 @@ class RealTime:
         self._passed += due
         return due
 
-    def rate(self, now_ns: int) -> Rate:
-        """Return the rate since the last call, or since the start, at a time, ns."""
-        elapsed = max(1, now_ns - self._since_ns) * 1e-9
-        rate = Rate(
-            1e9 / self._period,
-            self._passed / elapsed,
-            self._passed * self._period * 1e-9 / elapsed,
-        )
+    def speed(self, now_ns: int) -> float:
+        """Return how many times real time the clock ran since the last call, at a time, ns."""
+        speed = self._passed * self._period / max(1, now_ns - self._since_ns)
         self._since_ns, self._passed = now_ns, 0
-        return rate
+        return speed

@@ -26,6 +26,15 @@ TIME = 'time'
 """Name of the column of a table that holds the time after the first record, s."""
 
 
+def split(time_ns: int) -> tuple[int, int]:
+    """Return a time in ns as whole seconds and the nanoseconds after them.
+
+    Seconds beyond the 32 bits of a stamp wrap round, as they do in rclpy.
+    """
+    seconds, rest = divmod(time_ns, 1_000_000_000)
+    return (seconds + 2**31) % 2**32 - 2**31, rest
+
+
 class Field(NamedTuple):
     """A field of a row.
 

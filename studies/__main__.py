@@ -12,10 +12,7 @@ from ros_pad.commands.command import exit_status
 STUDIES = {
     'contact': ('work_precision.contact', 'methods for the contact model (15 s)'),
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
-    'capillary': (
-        'work_precision.capillary',
-        'methods for liquid on meshes (2 min, with rivals 5)',
-    ),
+    'capillary': ('work_precision.capillary', 'methods for liquid on meshes (2 min)'),
     'walk': ('work_precision.walk.study', 'fidelity levels of a walk (1 min, with Drake 30 min)'),
     'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (6 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
@@ -23,7 +20,6 @@ STUDIES = {
     'priors': ('work_precision.estimator.priors', 'friction with wrong foot files (30 min)'),
     'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),
     'liquid_limits': ('work_precision.liquid_limits', 'where liquid on meshes fails (4 min)'),
-    'thickness': ('work_precision.thickness', 'solids beside the membrane of a pad (5 min)'),
     'sensing': ('sensing.study', 'body and slip from IMU, joints and forces (3 min)'),
     'foreign': ('sensing.foreign', 'the same on recordings of real robots (2 min)'),
     'film': ('work_precision.film', 'liquid squeezed from under soft pads (6 min)'),

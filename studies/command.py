@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import inspect
 import json
 import pathlib
@@ -24,7 +23,6 @@ from ros_pad.commands.progress import bar
 from ros_pad.reports.files import save
 from ros_pad.reports.style import rendered
 from studies.machine import machine
-from studies.work_precision import comparison
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CHARTS = ROOT / 'docs' / 'charts'
@@ -160,6 +158,23 @@ def write(
     return kept
 
 
+def listed(rows: Sequence[Mapping[str, Any]], title: str = '') -> str:
+    """Return rows as a table in text, numbers with four digits."""
+
+    def word(value: Any) -> str:
+        if isinstance(value, Mapping):
+            return ', '.join(f'{key} {word(each)}' for key, each in value.items())
+        if isinstance(value, (list, tuple)):
+            return ' '.join(map(word, value)) if len(value) <= 6 else f'{len(value)} values'
+        return f'{value:.4g}' if isinstance(value, float) else '-' if value is None else str(value)
+
+    names = [*{name: None for row in rows for name in row}]
+    lines = [names, *([word(row[name]) if name in row else '' for name in names] for row in rows)]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(names))]
+    shown = ('  '.join(map(str.ljust, line, widths)).rstrip() for line in lines)
+    return '\n'.join(filter(None, (title, *shown)))
+
+
 def show(options: argparse.Namespace, document: Any, table: str) -> None:
     """Print the JSON if ``--json`` was given, else the table."""
     print(json.dumps(document, indent=1, ensure_ascii=False) if options.json else table)
@@ -173,8 +188,7 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
     name : str
         Name of the study, and of its JSON file.
     study : module
-        Module with ``measure``, ``figures`` and, for a table of its own form, ``table``. Its
-        ``rivals``, if any, names a module that adds options, rows, a table and pictures.
+        Module with ``measure``, ``figures`` and, for a table of its own form, ``table``.
     words : sequence of str
         Arguments of the command line.
 
@@ -188,28 +202,18 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
     brief = 'cycles' in inspect.signature(study.measure).parameters
     if brief:
         add_count(part, '--cycles', None, 'gait cycles of each walk, for a short run')
-    rivals = importlib.import_module(study.rivals) if hasattr(study, 'rivals') else None
-    if rivals:
-        rivals.add_options(part)
     options = part.parse_args(words)
     chosen = {'cycles': options.cycles} if brief else {}
     folder = options.out or new_folder(None, f'chart_{name}')
     with bar(f'{name}: measuring', 100.0, '%') as reach:
         results = study.measure(lambda share: reach(100.0 * share), **chosen)
-    if rivals:
-        with bar(f'{name}: rivals', 100.0, '%') as reach:
-            results += rivals.measure(options, lambda share: reach(100.0 * share))
     with bar(f'{name}: drawing', 100.0, '%') as reach:
         pictures = study.figures(results, lambda share: reach(100.0 * share))
-        if rivals:
-            pictures |= rivals.figures(results)
     rows = [asdict(result) for result in results]
     write(folder, name, {'rows': rows}, pictures)
     if options.json:
         print(json.dumps(rows))
         return 0
-    print(getattr(study, 'table', comparison.table)(results))
-    if rivals:
-        print(rivals.table(results))
+    print(study.table(results) if hasattr(study, 'table') else listed(rows))
     print(f'table and pictures: {folder}')
     return 0

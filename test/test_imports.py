@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts import only what the table in docs/imports.yaml allows, and only the nodes need ROS.
-
-``python test/test_imports.py`` writes the table into docs/architecture.md.
-"""
+"""Parts import only what the table in docs/imports.yaml allows, and only the nodes need ROS."""
 
 import ast
 import functools
@@ -10,16 +7,13 @@ import pathlib
 import re
 import subprocess
 import sys
-from collections.abc import Iterable
 
 import pytest
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SOURCE = ROOT / 'ros_pad'
-ARCHITECTURE = ROOT / 'docs' / 'architecture.md'
 TABLE = yaml.safe_load((ROOT / 'docs' / 'imports.yaml').read_text(encoding='utf-8'))
-BEGIN, END = '<!-- imports:begin -->\n', '<!-- imports:end -->'
 
 ROS = {
     *('rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
@@ -54,32 +48,6 @@ def libraries(part: str, key: str) -> set[str]:
     return {name for word in TABLE[part].get(key, []) for name in WORDS.get(word, {word})}
 
 
-def rendered() -> str:
-    """Return the table as docs/architecture.md has it."""
-
-    def names(words: Iterable[str]) -> str:
-        return ', '.join(word if ' ' in word else f'`{word}`' for word in words)
-
-    lines = ['| part | holds | may import | libraries |', '|---|---|---|---|']
-    for part, row in TABLE.items():
-        inside = row.get('inside', [])
-        foreign = [
-            names(row.get('libraries', [])),
-            f'inside functions {names(inside)}' * bool(inside),
-        ]
-        below = f'{names(row["imports"])} and what they may' if 'imports' in row else ''
-        lines.append(
-            f'| `ros_pad.{part}` | {row["holds"]} | {below} | {"; ".join(filter(None, foreign))} |'
-        )
-    return '\n'.join(lines) + '\n'
-
-
-def written(page: str) -> str:
-    """Return a page with the table between its marks."""
-    before, _, rest = page.partition(BEGIN)
-    return before + BEGIN + rendered() + END + rest.partition(END)[2]
-
-
 def files(part: str) -> list[pathlib.Path]:
     """Return the source files of a part, which is one module or one package."""
     return [*SOURCE.glob(f'{part}.py'), *SOURCE.glob(f'{part}/**/*.py')]
@@ -109,11 +77,6 @@ def test_the_table_has_every_part_and_every_part_imports_what_is_below_it():
     order = list(TABLE)
     for place, part in enumerate(order):
         assert allowed(part) <= set(order[place + 1 :])
-
-
-def test_the_page_has_the_table():
-    page = ARCHITECTURE.read_text(encoding='utf-8')
-    assert page == written(page), 'run python test/test_imports.py'
 
 
 @pytest.mark.parametrize('part', TABLE)
@@ -253,7 +216,3 @@ def test_what_is_imported_is_declared():
         # Names of ROS wheels begin with the distribution.
         pip_name = name.replace('_', '-') if name in ROS else PIP_NAME.get(name, name)
         assert re.search(rf"'{pip_name}['>\[]", setup_py), f'{pip_name} is not in setup.py'
-
-
-if __name__ == '__main__':
-    ARCHITECTURE.write_text(written(ARCHITECTURE.read_text(encoding='utf-8')), encoding='utf-8')

@@ -56,14 +56,6 @@ def test_a_record_goes_out_when_it_is_complete():
     assert given(join.add(2, 8 * MS, **force(2.0), position=NAN)) == [(8, 1.0, 2.0)]
 
 
-def test_a_velocity_is_awaited_where_it_is_needed():
-    join = joiner((1,), ('force', 'position', 'velocity'))
-    assert join.add(1, 4 * MS, velocity=(0.0, 0.1), variance=(1e-6, 1e-6)) == []
-    assert join.add(1, 4 * MS, **force(1.0)) == []
-    (block,) = join.add(1, 4 * MS, **place(0.1))
-    assert block.rows[0]['velocity'].tolist() == [[0.0, 0.1]]
-
-
 def test_records_go_out_in_order_with_what_they_have():
     join = joiner()
     join.add(1, 4 * MS, **force(1.0), **place(0.1))
@@ -127,18 +119,6 @@ def test_a_late_position_is_not_used_after_a_newer_one():
     found += join.expire(math.inf)
     xs = [x for _, x in given(found, 'position', 0)]
     assert xs[1:3] == [0.8, 1.2] and math.isnan(xs[0]) and math.isnan(xs[3])
-
-
-def test_wrenches_at_other_moments_than_those_of_other_legs():
-    join, found = joiner(), []
-    for step in range(1, 21):
-        for leg in (1, 2):
-            stamp_ns = 4 * step * MS + leg * 100_000
-            found += join.add(leg, stamp_ns, **force(1.0), **place(0.1))
-    found += join.expire(math.inf)
-    stamps = [stamp for stamp, *_ in given(found)]
-    assert stamps == sorted(stamps) and len(found) == 40
-    assert all(np.isfinite(each[1:]).sum() == 1 for each in given(found))
 
 
 def test_a_clock_that_is_set_back_begins_anew():

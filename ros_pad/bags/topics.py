@@ -3,7 +3,7 @@
 
 Nodes of ros_pad send one another records of all feet. Robots of others publish by leg, and people
 look at single legs: :data:`OF_LEGS` has these topics, with the numbers of a record that they have.
-Nodes add message class and QoS to this table, in `ros_pad.nodes.topics`.
+Nodes add message class and QoS to this table, in `ros_pad.nodes.qos`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
 FRAME = 'header.frame_id'
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Topic:
     """A topic, or one per leg.
 
@@ -86,23 +86,11 @@ def _axes(path: str, axes: str = 'xyz') -> tuple[str, ...]:
 
 
 def _of_leg(
-    name: str,
-    type_name: str,
-    kind: Kind,
-    columns: Sequence[str],
-    values: Sequence[str],
-    unit: str = '',
-    frame: str = '',
-) -> Topic:
-    return Topic(
-        f'leg_{{leg}}/{name}',
-        type_name,
-        unit,
-        frame,
-        tuple(values),
-        record=kind,
-        columns=tuple(columns),
-    )
+    name: str, type_name: str, kind: Kind, columns: Sequence[str], values: Sequence[str],
+    unit: str = '', frame: str = '',
+) -> Topic:  # fmt: skip
+    pattern = f'leg_{{leg}}/{name}'
+    return Topic(pattern, type_name, unit, frame, tuple(values), False, kind, tuple(columns))
 
 
 def _number(
@@ -167,32 +155,29 @@ FROM_DRIVERS = (
 """Those of them that become records."""
 
 BODY_POSE = Topic(
-    'body/pose',
-    'geometry_msgs/msg/PoseStamped',
-    'm',
-    'world',
+    'body/pose', 'geometry_msgs/msg/PoseStamped', 'm', 'world',
     (*_axes('pose.position', 'xy'), *_axes('pose.orientation', 'xyzw')),
-)
+)  # fmt: skip
 ODOM = Topic(
-    'odom',
-    'nav_msgs/msg/Odometry',
-    'm, m/s',
-    'odom',
+    'odom', 'nav_msgs/msg/Odometry', 'm, m/s', 'odom',
     (*_axes('pose.pose.position'), *_axes('pose.pose.orientation', 'xyzw')),
-)
+)  # fmt: skip
 BODY_DOUBT = Topic('body/doubt', 'std_msgs/msg/String', values=('data',), text=True)
 IMU = Topic(
-    'imu/data',
-    'sensor_msgs/msg/Imu',
-    'rad/s, m/s²',
-    'imu_link',
+    'imu/data', 'sensor_msgs/msg/Imu', 'rad/s, m/s²', 'imu_link',
     (*_axes('angular_velocity'), *_axes('linear_acceleration')),
-)
+)  # fmt: skip
 JOINT_STATES = Topic('joint_states', TYPE, 'rad')
 MARKERS = Topic('markers', 'visualization_msgs/msg/MarkerArray', 'm')
 FEET_MARKERS = Topic('feet/markers', 'visualization_msgs/msg/MarkerArray', 'm')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's', values=('clock.sec', 'clock.nanosec'))
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
+
+RECORDED = (
+    *(CLOCK, *RECORDS, BODY_POSE, IMU, JOINT_STATES),
+    *(ODOM, BODY_DOUBT, MARKERS, DIAGNOSTICS),
+)
+"""The topics that a robot has only once; they are recorded."""
 
 TRIAL = (
     *(SAMPLE, ESTIMATE, COMMAND, PRESSURE, BODY_POSE, ODOM, BODY_DOUBT),
@@ -236,4 +221,13 @@ def from_record(topic: Topic, numbers: np.ndarray, ambient: float) -> np.ndarray
     return values
 
 
-__all__ = ['FROM_DRIVERS', 'OF_LEGS', 'RECORDS', 'TRIAL', 'Topic', 'from_record', 'to_record']
+__all__ = [
+    'FROM_DRIVERS',
+    'OF_LEGS',
+    'RECORDED',
+    'RECORDS',
+    'TRIAL',
+    'Topic',
+    'from_record',
+    'to_record',
+]

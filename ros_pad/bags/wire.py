@@ -9,7 +9,6 @@ so that PlotJuggler plots each number by its name. A bag has one record in each 
 
 from __future__ import annotations
 
-import functools
 import itertools
 import struct
 from collections.abc import Sequence
@@ -18,9 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.bags.codec import MessageType, message_type
-from ros_pad.bags.definitions import message_definition
 from ros_pad.errors import BadMessage
-from ros_pad.records import TIME, Block, Kind
+from ros_pad.records import TIME, Block, Kind, split
 
 TYPE = 'sensor_msgs/msg/JointState'
 
@@ -31,9 +29,8 @@ _NOTHING = bytes(2 * _COUNT.size)  # no velocity, no effort
 _LONGEST = 10_000  # records in a message, and s from the first to the last
 
 
-@functools.cache
 def _type() -> MessageType:
-    return message_type(TYPE, message_definition(TYPE))
+    return message_type(TYPE)
 
 
 class _Layout(NamedTuple):
@@ -61,8 +58,7 @@ class _Layout(NamedTuple):
 
     def message(self, stamp_ns: int, values: np.ndarray) -> bytes:
         """Return the message of some rows of values that begin at a time, ns."""
-        seconds, rest = divmod(stamp_ns, 1_000_000_000)
-        head = _HEAD.pack(_ENCAPSULATION, (seconds + 2**31) % 2**32 - 2**31, rest)
+        head = _HEAD.pack(_ENCAPSULATION, *split(stamp_ns))
         count = _COUNT.pack(values.size)
         gap = bytes(self.start - _HEAD.size - len(self.head) - _COUNT.size)
         return b''.join((head, self.head, count, gap, values.tobytes(), _NOTHING))

@@ -16,7 +16,7 @@ from mcap.records import Channel, Schema
 from mcap.writer import CompressionType, Writer
 
 from ros_pad.bags import metadata
-from ros_pad.bags.definitions import message_definition, type_hash
+from ros_pad.bags.codec import definition_of
 from ros_pad.bags.storage import Contents, scan
 from ros_pad.errors import BagError, InvalidInput
 
@@ -79,7 +79,7 @@ class BagWriter:
         self._topics: dict[str, dict[str, Any]] = {}  # entries of metadata.yaml
         self._channels: dict[str, int] = {}  # empty once the bag is closed
         self._schemas: dict[str, int] = {}
-        self._types: dict[str, tuple[str, bytes]] = {}  # hash and definition
+        self._types: dict[str, tuple[str, str]] = {}  # definition and hash
         self._next_flush = 0.0
         self._stream: IO[bytes] | None = None
         # Another thread waits for the disk, so that the caller does not.
@@ -121,13 +121,12 @@ class BagWriter:
             When the type is not installed, the topic is there already, or the bag is closed.
         """
         if type_name not in self._types:
-            definition = message_definition(type_name).encode()
-            self._types[type_name] = type_hash(type_name), definition
-        known_hash, definition = self._types[type_name]
+            self._types[type_name] = definition_of(type_name)
+        definition, known_hash = self._types[type_name]
         about = {'offered_qos_profiles': qos, 'topic_type_hash': known_hash}
         self.copy_topic(
             Channel(id=0, topic=name, message_encoding='cdr', metadata=about, schema_id=0),
-            Schema(id=0, name=type_name, encoding='ros2msg', data=definition),
+            Schema(id=0, name=type_name, encoding='ros2msg', data=definition.encode()),
         )
 
     def copy_topic(self, channel: Channel, schema: Schema) -> None:

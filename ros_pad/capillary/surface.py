@@ -6,13 +6,13 @@ energy is that of the free surface, the weight and the wetted wall: ``γ A + ρ 
 A_wet``. Volume and weight are integrals of z and z²/2 over the projected boundary, so that no
 tetrahedra are needed.
 
-The surface is a mesh of triangles between a ring on the wall of the pad and a ring far from it. Each
-vertex moves on a rail, so it has one unknown. Inside the surface the rail is the normal; far away it
-is a vertical line; on the wall it is the section of the wall by the half plane of the vertex'
-azimuth. So vertices cannot move along the surface, which would not change the energy, and wetted
-areas are integrals along rails. After each minimisation the vertices are averaged within the surface
-and get new rails. Gradient and Hessian are exact; the minimum is found by the trust-region Newton-CG
-method of SciPy.
+The surface is a mesh of triangles between a ring on the wall of the pad and a ring far from it.
+Each vertex moves on a rail, so it has one unknown. Inside the surface the rail is the normal; far
+away it is a vertical line; on the wall it is the section of the wall by the half plane of the
+vertex' azimuth. So vertices cannot move along the surface, which would not change the energy, and
+wetted areas are integrals along rails. After each minimisation the vertices are averaged within the
+surface and get new rails. Gradient and Hessian are exact; the minimum is found by the trust-region
+Newton-CG method of SciPy.
 """
 
 from __future__ import annotations
@@ -257,7 +257,7 @@ def _on_mesh(mesh: Mesh) -> tuple[tuple[float, float], Rails]:
     use = np.unique(walls)
     if not once or np.minimum(level - low, high - level).max() > 1e-6 * size or use.size < 12:
         raise MeshError(
-            f'{mesh.source}: the wall leans over itself, has ledges, has fewer than 12 vertices, or'
+            f'{mesh.source}: the wall leans over itself, has ledges or fewer than 12 vertices, or'
             f' does not surround the vertical line through {axis[0]:g}, {axis[1]:g} m exactly once'
         )
     radii = np.hypot(*points[use, :2].T)
@@ -713,7 +713,7 @@ def _across(surface: _Surface) -> Array:
 
 
 def _triangles(corners: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Return normals N, lengths of N, opposite edges, z + Σ z by corner, and the moment per N_z."""
+    """Return normals N, their lengths, opposite edges, z + Σ z by corner, moments per N_z."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
     opposite = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)

@@ -14,41 +14,37 @@ from typing import Any
 import numpy as np
 
 from ros_pad.bags import BagReader, recovery
-from ros_pad.commands.command import Commands, add_command, complain
+from ros_pad.commands.command import FOLDER, Commands, add_command, complain
 from ros_pad.commands.progress import bar
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.pace import part
 from ros_pad.trials import label as labels
 from ros_pad.trials.recorded import late
 
+_LOSSES = {
+    'unread_bytes': 'bytes at the end cannot be read',
+    'damaged_chunks': 'damaged chunks were left out',
+    'lost_messages': 'messages were left out: their topic was defined in a damaged chunk',
+}
+
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'bag',
-        run,
-        'List the content of a bag, or repair one.',
+    example = (
         'pad bag info runs/hexapod_patches_adaptive_seed0/bag\n'
-        '  pad bag repair my_trial --out my_trial_repaired',
+        'pad bag repair my_trial --out my_trial_repaired'
     )
-    part.add_argument(
-        'action',
-        choices=('info', 'repair'),
-        help='info: list topics with types, numbers of messages, rates, gaps and losses; repair:'
-        ' copy the messages that can be read from an incomplete bag (recorder killed, disk full)'
-        ' into a new bag',
+    text = (
+        'info: list topics with types, numbers of messages, rates, gaps and losses; repair: copy '
+        'the messages that can be read from an incomplete bag (recorder killed, disk full) into a '
+        'new bag.'
     )
-    part.add_argument(
-        'bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file'
-    )
-    part.add_argument(
-        '--out',
-        type=pathlib.Path,
-        metavar='FOLDER',
-        help='folder for the repaired bag (default: BAG_repaired beside BAG); BAG is not changed',
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    part = add_command(commands, 'bag', run, text, example)
+    add = part.add_argument
+    add('action', choices=('info', 'repair'), help='see above')
+    add('bag', type=pathlib.Path, metavar='BAG', help='folder of a bag, or one MCAP file')
+    add('--out', help='new folder for the repaired bag (default: BAG_repaired)', **FOLDER)
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -61,78 +57,56 @@ def run(options: argparse.Namespace) -> int:
         warnings.simplefilter('ignore')  # the problem is reported below
         with bar('opening', 1.0, 'bag', delay=1.0) as progress:
             reader = BagReader(options.bag, progress)
-    return _show(options, reader)
+    found = _content(options.bag, reader)
+    problem = found['problem']
+    if options.json:
+        print(json.dumps(found))
+        return 1 if problem else 0
+    _show(found)
+    return complain(f'{problem}: repair it with pad bag repair', 1) if problem else 0
 
 
 def _repair(options: argparse.Namespace) -> int:
     source: pathlib.Path = options.bag
     with bar('reading', 1.0, 'bag') as progress:
         found = recovery.inspect(source, progress)
-    whole = found.sound
-    folder: pathlib.Path = options.out or _beside(source)
-    if not whole:
+    written: pathlib.Path | None = None
+    if not found.sound:
+        # . and .. are no names for a folder
+        place = source if source.name.strip('.') else source.resolve()
+        name = place.stem if place.is_file() else place.name
+        written = options.out or place.with_name(f'{name}_repaired')
         with bar('writing', 1.0, 'bag') as progress:
-            found = recovery.repair(source, folder, progress)
+            found = recovery.repair(source, written, progress)
     if options.json:
-        written = None if whole else str(folder)
-        print(json.dumps({'bag': str(source), 'repaired': written} | asdict(found)))
-        return 0
-    if whole:
+        repaired = None if written is None else str(written)
+        print(json.dumps({'bag': str(source), 'repaired': repaired} | asdict(found)))
+    elif written is None:
         print(f'{source} is complete, {found.messages} messages; nothing was written')
-        return 0
-    print(f'{folder}: {found.messages} messages recovered')
-    _show_losses(asdict(found))
-    if found.closed and not found.described:
-        print('metadata.yaml was missing, or did not match the files')
-    return 0
-
-
-def _show_losses(found: Mapping[str, Any]) -> None:
-    for name, words in (
-        ('unread_bytes', 'bytes at the end cannot be read'),
-        ('damaged_chunks', 'damaged chunks were left out'),
-        ('lost_messages', 'messages were left out: their topic was defined in a damaged chunk'),
-    ):
-        if found.get(name):
-            print(f'{found[name]:8d}  {words}')
-
-
-def _beside(source: pathlib.Path) -> pathlib.Path:
-    """Return the default folder of a repaired bag."""
-    if not source.name.strip('.'):  # . and .. are no names for a folder
-        source = source.resolve()
-    name = source.stem if source.is_file() else source.name
-    return source.with_name(f'{name}_repaired')
-
-
-def _custom(reader: BagReader, key: str) -> dict[str, Any]:
-    """Return the custom data of a bag under a key."""
-    try:
-        return dict(json.loads(reader.custom_data.get(key, '{}')))
-    except (TypeError, ValueError) as error:
-        raise BagError(
-            f'{reader.path}: custom data {key!r} is not as ros_pad writes them: {error}'
-        ) from error
-
-
-def _show(options: argparse.Namespace, reader: BagReader) -> int:
-    found = _content(options.bag, reader)
-    if options.json:
-        print(json.dumps(found))
-        return 1 if found['problem'] else 0
-    _print(found)
-    if found['problem']:
-        return complain(f'{found["problem"]}: repair it with pad bag repair', 1)
+    else:
+        print(f'{written}: {found.messages} messages recovered')
+        _show_losses(asdict(found))
+        if found.closed and not found.described:
+            print('metadata.yaml was missing, or did not match the files')
     return 0
 
 
 def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
+    """Return what JSON has of a bag."""
+
+    def custom(key: str) -> dict[str, Any]:
+        try:
+            return dict(json.loads(reader.custom_data.get(key, '{}')))
+        except (TypeError, ValueError) as error:
+            raise BagError(
+                f'{reader.path}: custom data {key!r} is not as ros_pad writes them: {error}'
+            ) from error
+
     problem, times, slow = reader.problem, {}, []
     try:
         with bar('reading', 1.0, 'bag', delay=1.0) as progress:
             times = reader.log_times(part(progress, 0.0, 0.5))
             slow = late(reader, part(progress, 0.5, 1.0))
-            progress(1.0)
     except BagError as error:  # what does not depend on single messages is listed all the same
         problem = problem or str(error)
     return {
@@ -145,13 +119,13 @@ def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
             name: {'type': kind, 'messages': reader.counts[name]} | _timing(times.get(name))
             for name, kind in reader.topics.items()
         },
-        'lost': _custom(reader, labels.LOST),
+        'lost': custom(labels.LOST),
         'late': slow,
         'problem': problem,
-        'repair': _custom(reader, recovery.KEY),
-        'trial': _custom(reader, labels.KEY),
-        'made_with': _custom(reader, labels.MADE_WITH),
-        'parameters': _custom(reader, labels.PARAMETERS),
+        'repair': custom(recovery.KEY),
+        'trial': custom(labels.KEY),
+        'made_with': custom(labels.MADE_WITH),
+        'parameters': custom(labels.PARAMETERS),
     }
 
 
@@ -165,7 +139,7 @@ def _timing(times: np.ndarray | None) -> dict[str, float | None]:
     }
 
 
-def _print(found: Mapping[str, Any]) -> None:
+def _show(found: Mapping[str, Any]) -> None:
     print(f'{found["bag"]}: {found["messages"]} messages in {found["duration_s"]:.2f} s')
     trial, made_with, repair = found['trial'], found['made_with'], found['repair']
     if trial:
@@ -181,13 +155,19 @@ def _print(found: Mapping[str, Any]) -> None:
     for line in found['late']:
         print(line)
     print('messages    mean rate  longest gap  topic')
+    lost = dict(found['lost'])
     for name, topic in sorted(found['topics'].items()):
-        rate, gap = _in('Hz', topic['rate_hz']), _in('s', topic['longest_gap_s'])
-        lost = f'  {found["lost"][name]} lost' if name in found['lost'] else ''
-        print(f'{topic["messages"]:8d}  {rate:>11}  {gap:>11}  {name}  {topic["type"]}{lost}')
-    for name in sorted(set(found['lost']) - set(found['topics'])):
-        print(f'{found["lost"][name]} batches lost: {name}')
+        rate, gap = (
+            '-' if topic[key] is None else f'{topic[key]:.4g} {unit}'
+            for key, unit in (('rate_hz', 'Hz'), ('longest_gap_s', 's'))
+        )
+        gone = f'  {lost.pop(name)} lost' if name in lost else ''
+        print(f'{topic["messages"]:8d}  {rate:>11}  {gap:>11}  {name}  {topic["type"]}{gone}')
+    for name, count in sorted(lost.items()):
+        print(f'{count} batches lost: {name}')
 
 
-def _in(unit: str, value: float | None) -> str:
-    return '-' if value is None else f'{value:.4g} {unit}'
+def _show_losses(found: Mapping[str, Any]) -> None:
+    for name, words in _LOSSES.items():
+        if found.get(name):
+            print(f'{found[name]:8d}  {words}')

@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import argparse
-import pathlib
 
-from ros_pad.commands.command import Commands, add_command
+from ros_pad.commands.command import FOLDER, Commands, add_command
 from ros_pad.commands.study import run_study
 
 CHARTS = ('capillary', 'contact', 'estimator', 'meniscus', 'stability', 'walk')
@@ -14,28 +13,15 @@ CHARTS = ('capillary', 'contact', 'estimator', 'meniscus', 'stability', 'walk')
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'chart',
-        run,
+    text = (
         'Measure time, error and failures of every method on this machine; write table, JSON and '
-        'pictures. This runs python -m studies NAME, which needs a checkout of ros_pad.',
-        'pad chart contact',
+        'pictures. This runs python -m studies NAME, which needs a checkout of ros_pad.'
     )
-    part.add_argument(
-        'name',
-        choices=CHARTS,
-        help='study to run: stability takes 10 s, contact 15 s, walk about a minute, estimator and'
-        ' meniscus a minute and a half each, capillary two minutes',
-    )
-    part.add_argument(
-        '--out',
-        type=pathlib.Path,
-        metavar='DIR',
-        help='folder for the results; files of the same name are replaced (default: a new folder '
-        'in runs)',
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON list of rows')
+    part = add_command(commands, 'chart', run, text, 'pad chart contact')
+    add = part.add_argument
+    add('name', choices=CHARTS, help='study to run; they take from 10 s to two minutes')
+    add('--out', help='folder, in which files are replaced (default: a new one in runs)', **FOLDER)
+    add('--json', action='store_true', help='print one JSON list of rows')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,17 +5,21 @@ from __future__ import annotations
 
 import argparse
 import os
+import pathlib
 import re
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from ros_pad.errors import BagError, ConfigError, InvalidInput, PadError, reason
 from ros_pad.signals import INTERRUPTED
 
 WIDEST = 98  # largest width of tables in columns, also on a wider terminal
+
+FILE: dict[str, Any] = {'type': pathlib.Path, 'metavar': 'FILE'}
+FOLDER: dict[str, Any] = {'type': pathlib.Path, 'metavar': 'DIR'}
 
 Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 

@@ -11,10 +11,8 @@ from typing import Any
 from ros_pad import contact
 from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.configuration import number
-from ros_pad.contact.dome import ADHESION_SIGNS, MODELS
+from ros_pad.contact.dome import MODELS
 from ros_pad.contact.limits import criteria, largest_pressure
-from ros_pad.contact.resistance import RUBBER_SETTINGS
-from ros_pad.contact.thickness import HIGHEST
 from ros_pad.errors import InvalidInput, NoEquilibrium
 
 _TITLES = {
@@ -38,81 +36,44 @@ Shape of a pad at a pressure, free or pressed, and its force limits.
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'contact',
-        run,
-        'Shape of a pad at a pressure, free or pressed, and its force limits.',
-        'pad contact --pressure 75000 --force 0.1',
-    )
-    part.description = _DESCRIPTION
-    part.add_argument(
-        '--pressure', type=float, required=True, metavar='PA', help='gauge pressure in the pad, Pa'
-    )
-    part.add_argument(
-        '--force', type=float, default=0.0, metavar='N', help='load on the pad, N (default 0)'
-    )
+    example = 'pad contact --pressure 75000 --force 0.1'
+    part = add_command(commands, 'contact', run, _DESCRIPTION, example)
+    add = part.add_argument
+    text = 'gauge pressure in the pad, Pa'
+    add('--pressure', type=float, required=True, metavar='PA', help=text)
+    add('--force', type=float, default=0.0, metavar='N', help='load on the pad, N (0)')
     which = part.add_mutually_exclusive_group()
-    which.add_argument(
-        '--pad',
-        choices=('large', 'small'),
-        default='large',
-        help="one of the thesis' pads: radius 1.5 mm (large, default) or 0.5 mm (small)",
-    )
+    text = 'of the thesis: radius 1.5 mm (large, default) or 0.5 mm (small)'
+    which.add_argument('--pad', choices=('large', 'small'), default='large', help=text)
     which.add_argument('--foot', help='the pad of a foot: a name in config/feet or a YAML file')
-    which.add_argument(
-        '--material',
-        help='a pad of a material: a name in config/materials or a YAML file, with --radius and '
-        '--thickness',
-    )
-    part.add_argument('--radius', type=float, metavar='M', help='of a pad of a material, m')
-    part.add_argument('--thickness', type=float, metavar='M', help='of a pad of a material, m')
-    part.add_argument(
-        '--edge',
-        choices=tuple(HIGHEST),
-        help='how the sheet of a pad of a material is held at its rim: its free dome is corrected '
-        'for thickness (default: a membrane)',
-    )
-    part.add_argument(
-        '--adhesion',
-        choices=tuple(ADHESION_SIGNS),
-        help='sign of the adhesion between pad and floor (default matlab: the floor attracts); '
-        'pads of a material have none',
-    )
-    part.add_argument(
+    text = 'of a pad with --radius and --thickness: a name in config/materials or a YAML file'
+    which.add_argument('--material', help=text)
+    add('--radius', type=float, metavar='M', help='of a pad of a material, m')
+    add('--thickness', type=float, metavar='M', help='of a pad of a material, m')
+    add(
         '--model',
         choices=MODELS,
         help='thesis: spherical dome (default); membrane: exact and slower, but the free dome and '
         'the force limits remain those of the spherical dome; pads of a material are membranes',
     )
-    part.add_argument(
-        '--liquid',
-        choices=('water', 'thesis'),
-        default='water',
-        help="surface tensions of water on silicone (default), or those of the thesis' appendix",
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
     """Print shape, ring of liquid and force limits of the pad; return the exit status."""
-    pad, name = _pad(options)
-    _choose_law(pad, options)
-    liquid = contact.WATER if options.liquid == 'water' else contact.THESIS_LIQUID
+    pad = _pad(options)
     pressure, force = options.pressure, options.force
     values: dict[str, Any] = {
         'pad': options.material or options.foot or options.pad,
         'radius_m': pad.radius,
         'stiffness_n_per_m': pad.stiffness,
-        'edge': pad.edge,
-        'adhesion': options.adhesion,
         'model': options.model,
         'pressure_pa': pressure,
         'force_n': force,
     }
     failure: NoEquilibrium | None = None
     try:
-        for part, shape in _shapes(pad, liquid, options):
+        for part, shape in _shapes(pad, options):
             values[part] = shape
     except NoEquilibrium as error:  # the results before the error are still printed
         failure = error
@@ -126,95 +87,59 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(values))
     else:
-        _show(f'{name}, {pressure:g} Pa gauge, {force:g} N', values, ends, pad.radius)
+        _show(values, ends)
     return 0 if failure is None else complain(f'{failure} (status {failure.status})', 1)
 
 
-def _pad(options: argparse.Namespace) -> tuple[contact.Pad, str]:
-    """Return the pad that the options name, and its name."""
-    pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
-    name = f'{options.pad} pad'
-    if options.foot is not None:
-        pad, name = contact.Foot.load(options.foot).pad, f'pad of {options.foot}'
+def _pad(options: argparse.Namespace) -> contact.Pad:
+    """Return the pad that the options name; set the model where none was given."""
     if options.material is not None:
         material = contact.Material.load(options.material)
-        sizes = RUBBER_SETTINGS[0], RUBBER_SETTINGS[-1]
-        for each in sizes:
-            if getattr(options, each.name) is None:
-                raise InvalidInput(
-                    f'--{each.name} is missing: {each.allowed} is needed with --material'
-                )
-        radius, thickness = (
-            number(f'--{each.name}', getattr(options, each.name), each.unit, each.low, each.high)
-            for each in sizes
-        )
-        made = contact.Pad.of(material, radius, thickness, edge=options.edge)
-        return made, f'pad of {options.material}'
-    for key in ('radius', 'thickness', 'edge'):
-        if getattr(options, key) is not None:
-            raise InvalidInput(f'--{key} is not allowed without --material')
-    return pad, name
+        radius = number('--radius', options.radius, 'm', 1e-4, 1e-2)
+        thickness = number('--thickness', options.thickness, 'm', 1e-5, 1e-2)
+        pad = contact.Pad.of(material, radius, thickness)
+    else:
+        for key in ('radius', 'thickness'):
+            if getattr(options, key) is not None:
+                raise InvalidInput(f'--{key} is not allowed without --material')
+        pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
+        if options.foot is not None:
+            pad = contact.Foot.load(options.foot).pad
+    if options.model is None:
+        options.model = 'thesis' if pad.material is None else 'membrane'
+    elif pad.material is not None:
+        raise InvalidInput('--model is not allowed for a pad of a material')
+    return pad
 
 
-def _choose_law(pad: contact.Pad, options: argparse.Namespace) -> None:
-    """Set the adhesion and model that were not given; refuse those that the pad does not have."""
-    cap = pad.material is None
-    for key, of_cap, of_rubber in (
-        ('adhesion', 'matlab', 'none'),
-        ('model', 'thesis', 'membrane'),
-    ):
-        if getattr(options, key) is None:
-            setattr(options, key, of_cap if cap else of_rubber)
-        elif not cap:
-            raise InvalidInput(f'--{key} is not allowed for a pad of a material')
-
-
-def _shapes(
-    pad: contact.Pad, liquid: contact.Liquid, options: argparse.Namespace
-) -> Iterator[tuple[str, dict[str, Any]]]:
+def _shapes(pad: contact.Pad, options: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield name and values of the free dome, the pressed dome and its ring of liquid.
 
     Raises NoEquilibrium at the first of them that does not exist.
     """
+
+    def values(of: Any, *names: str) -> dict[str, Any]:
+        units = {'volume': '_m3', 'tangential_force': '_n', 'status': ''}
+        return {name + units.get(name, '_m'): getattr(of, name) for name in names}
+
     pressure, force = options.pressure, options.force
     free = contact.inflate(pad, pressure)
-    yield (
-        'free',
-        {
-            'height_m': free.height,
-            'sphere_radius_m': free.sphere_radius,
-            'volume_m3': free.volume,
-        },
-    )
-    pressed = contact.press(pad, pressure, force, options.adhesion, options.model)
-    yield (
-        'pressed',
-        {
-            'height_m': pressed.height,
-            'depth_m': pressed.depth,
-            'contact_radius_m': pressed.contact_radius,
-            'sphere_radius_m': pressed.sphere_radius,
-            'gap_m': pressed.gap,
-            'status': pressed.status,
-        },
-    )
+    yield 'free', values(free, 'height', 'sphere_radius', 'volume')
+    adhesion = 'matlab' if pad.material is None else 'none'
+    pressed = contact.press(pad, pressure, force, adhesion, options.model)
+    names = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap', 'status')
+    yield 'pressed', values(pressed, *names)
     if not force > 0.0:  # the ring around a dome without load is too small to compute
         yield 'meniscus', {'status': 'no_contact'}
         return
-    wet = contact.meniscus(pressed, liquid)
-    yield (
-        'meniscus',
-        {
-            'height_m': wet.height,
-            'ring_radius_m': wet.ring_radius,
-            'tangential_force_n': wet.tangential_force,
-            'status': wet.status,
-        },
-    )
+    ring = contact.meniscus(pressed, contact.WATER)
+    yield 'meniscus', values(ring, 'height', 'ring_radius', 'tangential_force', 'status')
 
 
-def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radius: float) -> None:
-    print(heading)
+def _show(values: dict[str, Any], ends: dict[str, float]) -> None:
+    pad, pressure, force = values['pad'], values['pressure_pa'], values['force_n']
+    name = f'{pad} pad' if pad in ('large', 'small') else f'pad of {pad}'
+    print(f'{name}, {pressure:g} Pa gauge, {force:g} N')
     for part, title in _TITLES.items():
         if part not in values:
             continue
@@ -227,7 +152,5 @@ def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radi
                 print(f'  {key:18} {value}')
             else:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
-        if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad_radius:
+        if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > values['radius_m']:
             print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')
-    if not ends:
-        print('  none is known for a pad with an edge: pressed, it has no model')

@@ -23,17 +23,13 @@ import textwrap
 import threading
 import time
 import uuid
-import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from functools import partial
 from importlib import metadata
 
 from ros_pad.commands.command import WIDEST, Commands, add_command, complain
-from ros_pad.pace import Progress
 
-OLDEST, NEWEST = (3, 11), (3, 13)  # versions of Python with which ros_pad is tested
 DISTRIBUTION = 'jazzy'  # distribution of ROS 2 with which ros_pad is tested
 NEEDED = ('numpy', 'scipy', 'yaml', 'tqdm', 'mcap', 'rosbags', 'serial')
 # Optional modules, each with the extra of ros_pad that installs it, and its purpose.
@@ -55,11 +51,9 @@ ROS_MODULES = (
 )
 LOOPBACK = 10.0  # s, longest time of a message from one process to another
 STARTING = 30.0  # s, longest time to import rclpy or an extra, which is slow at first
-KINDS = ('scenes', 'feet', 'materials', 'robots', 'mappings')  # of shipped files
-ROOM_NEEDED, ROOM_WANTED = 0.1e9, 1e9  # free bytes below which there is a problem, a warning
 
 _DESCRIPTION = f"""\
-Check Python, packages, shipped files, ROS 2, its middleware, serial ports and disk;
+Check Python, packages, configuration, ROS 2, its middleware, serial ports and disk;
 advise what to do.
 One check sends a message between two processes with the ROS settings of this shell; the
 message must arrive within {LOOPBACK:g} s.
@@ -78,16 +72,18 @@ pad doctor --robot go2 --mapping go2
 pad doctor --robot my_robot.urdf --feet lf_foot rf_foot lh_foot rh_foot --bag my_bag"""
 _ONE_ROS = (
     'one ROS 2 at a time: open a new shell and either source /opt/ros/jazzy/setup.bash or'
-    ' activate .venv, not both'
+    ' activate .venv, not both; unset RMW_IMPLEMENTATION, or install what it names'
 )
-_RMW = (
-    'unset RMW_IMPLEMENTATION, or install the middleware that it names'
-    f' (sudo apt install ros-{DISTRIBUTION}-rmw-cyclonedds-cpp)'
+_DISCOVERY = (
+    'ROS_DOMAIN_ID, 0 to 101, must be the same in all processes; without multicast (VPN,'
+    ' container) export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, and never OFF; unset other'
+    ' variables above; let UDP pass the firewall on loopback; run fastdds shm clean when no node'
+    ' runs'
 )
-_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-_OVERRIDES = (  # variables that change discovery, and can keep nodes from connecting
-    'ROS_STATIC_PEERS', 'ROS_LOCALHOST_ONLY', 'ROS_DISCOVERY_SERVER', 'CYCLONEDDS_URI',
-    'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE',
+_DISCOVERY_VARIABLES = (  # that can keep nodes from connecting
+    'ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS', 'ROS_LOCALHOST_ONLY',
+    'ROS_DISCOVERY_SERVER', 'CYCLONEDDS_URI', 'FASTRTPS_DEFAULT_PROFILES_FILE',
+    'FASTDDS_DEFAULT_PROFILES_FILE',
 )  # fmt: skip
 
 
@@ -95,7 +91,7 @@ _OVERRIDES = (  # variables that change discovery, and can keep nodes from conne
 class Finding:
     """Result of a check.
 
-    ``status`` is ``ok``, ``warning`` or ``problem``; ``advice`` is empty if the status is ``ok``.
+    ``status`` is ``ok``, ``warning`` or ``problem``; ``advice`` may be empty.
     """
 
     what: str
@@ -108,11 +104,6 @@ def add(commands: Commands) -> None:
     """Add the command and its arguments."""
     part = add_command(commands, 'doctor', run, _DESCRIPTION, _EXAMPLES)
     part.add_argument('--json', action='store_true', help='print one JSON object')
-    _add_robot(part)
-
-
-def _add_robot(part: argparse.ArgumentParser) -> None:
-    """Add the arguments for the sensors of a robot."""
     group = part.add_argument_group('sensors of a robot')
     group.add_argument(
         '--robot',
@@ -121,11 +112,7 @@ def _add_robot(part: argparse.ArgumentParser) -> None:
         ' name, or a .yaml or .urdf file',
     )
     group.add_argument(
-        '--feet',
-        nargs='+',
-        default=[],
-        metavar='LINK',
-        help='the links of the feet in a URDF file',
+        '--feet', nargs='+', default=[], metavar='LINK', help='links of the feet in a URDF file'
     )
     group.add_argument('--imu', default='', metavar='LINK', help='the link of the IMU in it')
     group.add_argument(
@@ -157,7 +144,12 @@ def run(options: argparse.Namespace) -> int:
     """Run all checks and print their findings; return the exit status."""
     if options.bag and not options.robot:
         return complain('--bag needs --robot: the robot whose sensors are in it', 2)
-    found = _robot(options) if options.robot else _machine()
+    if options.robot:
+        from ros_pad.commands.robot_check import findings
+
+        found = [Finding(*each) for each in findings(options)]
+    else:
+        found = list(examine())
     counts = {
         f'{status}s': sum(each.status == status for each in found)
         for status in ('problem', 'warning')
@@ -171,60 +163,31 @@ def run(options: argparse.Namespace) -> int:
     return 1 if counts['problems'] else 0
 
 
-def _machine() -> list[Finding]:
-    """Check the machine."""
-    try:
-        from ros_pad.commands.progress import bar
-    except ImportError:  # the missing package is among the findings
-        return list(examine())
-    with bar('checking', 1.0, 'machine') as progress:
-        return list(examine(progress))
-
-
-def _robot(options: argparse.Namespace) -> list[Finding]:
-    """Check the sensors of a robot."""
-    from ros_pad.commands.robot_check import findings
-
-    return [Finding(*each) for each in findings(options)]
-
-
 def _show(finding: Finding) -> None:
-    width = min(shutil.get_terminal_size().columns, WIDEST)
-    lines = [f'{finding.status:8} {finding.what}: {finding.found}']
-    if finding.advice:
-        lines.append(f'{"":9}-> {finding.advice}')
-    for line in lines:
-        # Do not break paths and settings, so that they can be copied.
-        print(
-            textwrap.fill(
-                line, width, subsequent_indent=' ' * 12,
-                break_long_words=False, break_on_hyphens=False,
-            )
-        )  # fmt: skip
-
-
-def examine(progress: Progress | None = None) -> Iterator[Finding]:
-    """Run all checks one after the other, and yield their findings."""
-    checks: tuple[Callable[[], Iterator[Finding]], ...] = (
-        python, packages, extras, browser, config_folder, shipped_files, ros, serial_ports,
-        folders,
+    # Paths and settings are not broken, so that they can be copied.
+    wrapper = textwrap.TextWrapper(
+        min(shutil.get_terminal_size().columns, WIDEST), subsequent_indent=' ' * 12,
+        break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
-    for number, check in enumerate(checks, 1):
+    print(wrapper.fill(f'{finding.status:8} {finding.what}: {finding.found}'))
+    if finding.advice:
+        print(wrapper.fill(f'{"":9}-> {finding.advice}'))
+
+
+def examine() -> Iterator[Finding]:
+    """Run all checks one after the other, and yield their findings."""
+    for check in (python, packages, extras, config_folder, ros, serial_ports, folders):
         yield from check()
-        if progress:
-            progress(number / len(checks))
 
 
 def python(version: Sequence[int | str] = sys.version_info) -> Iterator[Finding]:
     """Check the version of Python."""
-    text = '.'.join(map(str, version[:3]))
-    tested = f'{OLDEST[0]}.{OLDEST[1]} to {NEWEST[0]}.{NEWEST[1]}'
-    if tuple(version[:2]) < OLDEST:
-        yield Finding('Python', 'problem', text, f'ros_pad needs {tested}: make PYTHON=python3.12')
-    elif tuple(version[:2]) > NEWEST:
-        yield Finding('Python', 'warning', text, f'ros_pad is tested with {tested}')
+    text = f'{".".join(map(str, version[:3]))}, {sys.executable}'
+    if (3, 11) <= tuple(version[:2]) <= (3, 13):
+        yield Finding('Python', 'ok', text)
     else:
-        yield Finding('Python', 'ok', f'{text}, {sys.executable}')
+        status = 'problem' if tuple(version[:2]) < (3, 11) else 'warning'
+        yield Finding('Python', status, text, 'ros_pad is tested with 3.11 to 3.13')
 
 
 def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
@@ -236,10 +199,7 @@ def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
         except Exception as error:  # whatever a broken package raises
             wrong.append(f'{name} ({type(error).__name__}: {error})')
     if wrong:
-        advice = (
-            'create .venv again (make clean run), or pip install --editable . in the folder of'
-            ' ros_pad, or rosdep install --from-paths src --ignore-src'
-        )
+        advice = 'pip install --editable . in the folder of ros_pad, or rosdep install'
         yield Finding('packages', 'problem', f'not usable: {", ".join(wrong)}', advice)
         return
     yield Finding('packages', 'ok', ', '.join(names))
@@ -252,32 +212,25 @@ def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
 
 def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
     """Check the packages that only some users need, importing each in a process of its own."""
-    here = [name for name in names if importlib.util.find_spec(name)]
-    with ThreadPoolExecutor(max_workers=len(here) or 1) as pool:
-        errors = dict(zip(here, pool.map(_import_error, here), strict=True))
-    for name in names:
+
+    def error_of(name: str) -> str:
+        if not importlib.util.find_spec(name):
+            return 'not installed'
+        return _child(f'import sys; sys.path[:] = {sys.path!r}; import {name}', f'import {name}')[
+            0
+        ]
+
+    with ThreadPoolExecutor() as pool:
+        errors = list(pool.map(error_of, names))
+    for name, error in zip(names, errors, strict=True):
         extra, purpose = EXTRAS[name]
-        if name not in here:
-            yield Finding(name, 'warning', f'not installed: {purpose}', _install(extra))
-        elif errors[name]:
-            advice = f'pip install --force-reinstall {name}, or pip uninstall {name} if not needed'
-            yield Finding(name, 'warning', f'{errors[name]}; {purpose}', advice)
+        if error:
+            advice = f'pip install "ros_pad[{extra}]", in a checkout: pip install -e ".[{extra}]"'
+            yield Finding(name, 'warning', f'{error}: {purpose}', advice)
         else:
             with contextlib.suppress(metadata.PackageNotFoundError):
                 purpose = f'{metadata.version(name)}: {purpose.partition(";")[0]}'
             yield Finding(name, 'ok', purpose)
-
-
-def _install(extra: str, checkout: pathlib.Path = pathlib.Path(__file__).parents[2]) -> str:
-    """Return the command that installs an extra of ros_pad."""
-    if (checkout / 'setup.py').is_file():
-        return f'pip install --editable "{checkout}[{extra}]"'
-    return f'pip install "ros_pad[{extra}]"'
-
-
-def _import_error(name: str) -> str:
-    """Import a package in a separate process; return the error, or an empty text."""
-    return _child(f'import sys; sys.path[:] = {sys.path!r}; import {name}', f'import {name}')[0]
 
 
 def _child(code: str, what: str) -> tuple[str, str]:
@@ -301,66 +254,12 @@ def config_folder() -> Iterator[Finding]:
         from ros_pad import configuration
 
         folder = configuration.shared_folder()
-        counts = [f'{len(configuration.names(kind))} {kind}' for kind in KINDS]
+        kinds = ('scenes', 'feet', 'materials', 'robots', 'mappings')
+        counts = [f'{len(configuration.names(kind))} {kind}' for kind in kinds]
         yield Finding('config folder', 'ok', f'{folder}: {", ".join(counts)}')
     except Exception as error:  # ConfigError, or any error of the import
         advice = 'source install/setup.bash of your workspace, or pip install ros_pad again'
         yield Finding('config folder', 'problem', str(error), advice)
-
-
-def shipped_files() -> Iterator[Finding]:
-    """Check that every shipped scene, foot, material, robot and mapping can be read."""
-    wrong = []
-    try:
-        from ros_pad import configuration
-        from ros_pad.contact import Foot, Material
-        from ros_pad.robots import Robot
-        from ros_pad.simulation.fidelity import Promises
-        from ros_pad.simulation.scene import Scene, is_bench
-
-        def text(kind: str, name: str) -> None:
-            configuration.Table.load(configuration.locate(kind, name))
-
-        loaders: dict[str, Callable[[str], object]] = {
-            'feet': Foot.load,
-            'materials': Material.load,
-            'robots': Robot.load,
-        }
-        for kind in KINDS:
-            for name in configuration.names(kind):
-                try:
-                    if kind == 'scenes' and not is_bench(name):
-                        Scene.load(name)
-                    else:
-                        loaders.get(kind, partial(text, kind))(name)
-                except Exception as error:
-                    wrong.append(str(error))
-        Promises.load()
-    except Exception as error:  # of an import, of the folder, or of the bounds of the levels
-        wrong.append(str(error))
-    if wrong:
-        advice = 'undo the changes of these files, or pip install --force-reinstall ros_pad'
-        yield Finding('shipped files', 'problem', '; '.join(wrong), advice)
-    else:
-        yield Finding('shipped files', 'ok', 'all can be read, and the bounds of fidelity levels')
-
-
-def browser() -> Iterator[Finding]:
-    """Check that there is a browser for ``pad explore``, if that is installed."""
-    if not importlib.util.find_spec('nicegui'):
-        return
-    try:
-        name = webbrowser.get().name
-    except webbrowser.Error:
-        yield Finding(
-            'browser',
-            'warning',
-            'none can be opened here, for the page of pad explore',
-            'sudo apt install firefox, or open the address that pad explore --no-browser prints;'
-            ' from another machine after ssh -L PORT:localhost:PORT HOST',
-        )
-    else:
-        yield Finding('browser', 'ok', f'{name} opens the page of pad explore')
 
 
 _ROS = """
@@ -387,29 +286,24 @@ def ros() -> Iterator[Finding]:
     error, output = _child(f'MODULES = {ROS_MODULES!r}\n{_ROS}', 'import rclpy')
     sources = ros_sources()
     if error:
-        advice = _RMW if 'RMW' in error else f'{_ONE_ROS}; run fastdds shm clean when no node runs'
-        yield Finding('ROS 2', 'problem', error, advice)
+        yield Finding('ROS 2', 'problem', error, _ONE_ROS)
         return
     found = json.loads(output.strip().rpartition('\n')[2])
     wrong = ', '.join(found['wrong'])
-    if not found['path']:
-        if sources or 'No module' not in wrong:
-            yield Finding('ROS 2', 'problem', wrong, _ONE_ROS)
-        else:
-            yield Finding(
-                'ROS 2',
-                'warning',
-                'no rclpy: nodes cannot run, and pad run needs --no-ros; all other commands work',
-                'pip install "ros_pad[ros]", or install ROS 2 from apt and source its setup.bash',
-            )
+    if not found['path'] and not sources and 'No module' in wrong:
+        text = 'no rclpy: nodes cannot run, and pad run needs --no-ros; all other commands work'
+        advice = 'pip install "ros_pad[ros]", or install ROS 2 from apt and source its setup.bash'
+        yield Finding('ROS 2', 'warning', text, advice)
         return
-    yield which_ros(found['path'], sources)
+    if found['path']:
+        yield which_ros(found['path'], sources)
     if wrong:
-        advice = 'pip install "ros_pad[ros]", or rosdep install --from-paths src --ignore-src'
-        yield Finding('messages', 'problem', wrong, _RMW if 'middleware' in wrong else advice)
+        advice = f'pip install "ros_pad[ros]", or rosdep install; {_ONE_ROS}'
+        yield Finding('messages' if found['path'] else 'ROS 2', 'problem', wrong, advice)
         return
-    names = ('ROS_DOMAIN_ID', _RANGE, *_OVERRIDES)
-    settings = [f'{name}={os.environ[name]}' for name in names if os.environ.get(name)]
+    settings = [
+        f'{each}={os.environ[each]}' for each in _DISCOVERY_VARIABLES if each in os.environ
+    ]
     text = ', '.join(settings) or 'domain 0, discovery in the whole subnet'
     yield Finding('middleware', 'ok', f'{found["rmw"]}; {text}')
     yield loopback()
@@ -435,89 +329,52 @@ def which_ros(path: str, sources: dict[str, str]) -> Finding:
     distribution = next(iter(sources.values()), os.environ.get('ROS_DISTRO') or 'unknown')
     text = f'{distribution}: {pathlib.Path(path).parent}'
     if distribution != DISTRIBUTION:
-        advice = f'ros_pad is tested with {DISTRIBUTION} (see QUALITY_DECLARATION.md)'
-        return Finding('ROS 2', 'warning', text, advice)
+        return Finding('ROS 2', 'warning', text, f'ros_pad is tested with {DISTRIBUTION}')
     return Finding('ROS 2', 'ok', text)
 
 
 def loopback(patience: float = LOOPBACK) -> Finding:
     """Send a message from one process to another, within ``patience`` s once both have started."""
-    topic, word = f'/ros_pad_doctor_{uuid.uuid4().hex}', uuid.uuid4().hex
-    command = [sys.executable, '-m', 'ros_pad.nodes.loopback']
+    words = [f'/ros_pad_doctor_{uuid.uuid4().hex}', uuid.uuid4().hex]
+    words += ['--seconds', str(STARTING + patience)]
     children = [
         subprocess.Popen(
-            [*command, end, topic, word, '--seconds', str(STARTING + patience)],
+            [sys.executable, '-m', 'ros_pad.nodes.loopback', end, *words],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))},
         )
         for end in ('subscriber', 'publisher')
     ]  # fmt: skip
-
-    def kill() -> None:
-        for child in children:
-            child.kill()
-
     # A process may hang without output, for example at a lock that a killed process has left.
-    limit = threading.Timer(STARTING, kill)
+    limit = threading.Timer(STARTING, lambda: [*map(subprocess.Popen.kill, children)])
     limit.start()
+    text = f'no message from one process to another within {patience:g} s: separate nodes do not'
+    text += ' find one another (pad run without --live does not need it)'
     try:
         for child in children:
             assert child.stdout is not None and child.stderr is not None
             if child.stdout.readline() != 'ready\n':
-                _end([child])
+                child.terminate()
                 error = f'a node does not start: {_last_line(child.stderr.read())}'
-                return Finding('loopback', 'problem', error, f'{discovery_advice()}; {_RMW}')
+                return Finding('loopback', 'problem', error, f'{_DISCOVERY}; {_ONE_ROS}')
         limit.cancel()
         started = time.monotonic()
         if children[0].wait(patience) == 0:
-            took = time.monotonic() - started
-            text = f'a message from process to process after {took:.1f} s (limit {patience:g} s)'
-            return Finding('loopback', 'ok', text)
+            text = f'a message went from process to process in {time.monotonic() - started:.1f} s'
+            return Finding('loopback', 'ok', f'{text} (limit {patience:g} s)')
     except subprocess.TimeoutExpired:
         pass
     finally:
         limit.cancel()
-        _end(children)
-    return Finding(
-        'loopback',
-        'problem',
-        f'no message from one process to another within {patience:g} s: separate nodes do not'
-        ' find one another (pad run without --live does not need it)',
-        discovery_advice(),
-    )
-
-
-def _end(children: Sequence[subprocess.Popen[str]]) -> None:
-    """End processes, first by SIGTERM, so that they leave nothing in shared memory."""
-    for child in children:
-        child.terminate()
-    for child in children:
-        try:
-            child.wait(5.0)
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.wait()
-
-
-def discovery_advice() -> str:
-    """Return what to do if nodes on one machine do not connect; causes found here come first."""
-    hints = []
-    domain = os.environ.get('ROS_DOMAIN_ID') or '0'
-    if known := domain.isdecimal() and int(domain) <= 101:
-        port = 7400 + 250 * int(domain)  # first UDP port of the domain, by default of DDS
-    else:
-        hints.append(f'ROS_DOMAIN_ID={domain}: a number from 0 to 101 is needed')
-    reach = os.environ.get(_RANGE, '')
-    if not reach:
-        hints.append(f'no multicast on this network (VPN, container): export {_RANGE}=LOCALHOST')
-    elif reach.upper() == 'OFF':
-        hints.append(f'{_RANGE}=OFF keeps processes apart: set it to LOCALHOST')
-    overrides = [name for name in _OVERRIDES if os.environ.get(name)]
-    hints += [f'unset {name}, which changes discovery' for name in overrides]
-    if known:
-        hints.append(f'allow UDP ports {port} to {port + 249} on the loopback in the firewall')
-        hints.append('ROS_DOMAIN_ID must be the same in all processes')
-    return '; '.join([*hints, 'run fastdds shm clean when no node runs'])
+        for child in children:
+            child.terminate()  # so that it leaves nothing in shared memory
+        for child in children:
+            try:
+                child.wait(5.0)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.wait()
+    return Finding('loopback', 'problem', text, _DISCOVERY)
 
 
 def serial_ports(ports: Sequence[str] | None = None) -> Iterator[Finding]:
@@ -526,8 +383,7 @@ def serial_ports(ports: Sequence[str] | None = None) -> Iterator[Finding]:
         try:
             from serial.tools import list_ports
         except ImportError as error:
-            advice = 'pip install pyserial, or sudo apt install python3-serial'
-            yield Finding('serial ports', 'problem', str(error), advice)
+            yield Finding('serial ports', 'problem', str(error), 'pip install pyserial')
             return
         ports = sorted(port.device for port in list_ports.comports())
     if not ports:
@@ -535,55 +391,32 @@ def serial_ports(ports: Sequence[str] | None = None) -> Iterator[Finding]:
     for port in ports:
         if os.access(port, os.R_OK | os.W_OK):
             yield Finding('serial port', 'ok', f'{port} may be opened')
-        elif not os.path.exists(port):
-            yield Finding('serial port', 'warning', f'{port} does not exist', 'plug it in again')
         else:
-            try:
-                group = pathlib.Path(port).group()
-            except (KeyError, OSError):
-                group = 'dialout'
-            yield Finding(
-                'serial port',
-                'warning',
-                f'{port} may not be opened by you: it belongs to the group {group}',
-                f'sudo usermod -aG {group} $USER, then log out and in',
-            )
+            advice = 'sudo usermod -aG dialout $USER, then log out and in'
+            yield Finding('serial port', 'warning', f'{port} may not be opened by you', advice)
 
 
 def folders(here: pathlib.Path = pathlib.Path()) -> Iterator[Finding]:
     """Check that bags and logs can be written, and that the disk has enough space for bags."""
-    runs = here / 'runs'
-    place = runs if runs.exists() else here
-    if error := _write_error(place):
-        advice = 'change to a folder that you may write to, or give --out'
-        yield Finding('runs/', 'problem', f'{place.resolve()}: {error}', advice)
-    else:
-        free = shutil.disk_usage(place).free
-        text = f'{runs.resolve()}: {free / 1e9:.1f} GB free'
-        advice = 'a minute of six legs takes 10 to 20 MB: free space, or use --out on another disk'
-        if free < ROOM_WANTED:
-            status = 'problem' if free < ROOM_NEEDED else 'warning'
-            yield Finding('runs/', status, text, advice)
-        else:
-            yield Finding('runs/', 'ok', text)
     home = os.environ.get('ROS_HOME') or '~/.ros'
     logs = pathlib.Path(os.environ.get('ROS_LOG_DIR') or f'{home}/log').expanduser()
-    if error := _write_error(logs):
-        advice = 'export ROS_LOG_DIR=/tmp/ros_log, or fix its permissions: nodes need it to start'
-        yield Finding('logs', 'problem', f'{logs}: {error}', advice)
-    else:
-        yield Finding('logs', 'ok', f'{logs}')
-
-
-def _write_error(folder: pathlib.Path) -> str:
-    """Return why nothing can be written to a folder, which may not exist yet, or an empty text."""
-    while not folder.exists() and folder.parent != folder:
-        folder = folder.parent
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            return ''
-    except OSError as error:
-        return str(error.strerror)
+    runs = here / 'runs'
+    for name, folder, advice in (
+        ('runs/', runs, 'give --out: a minute of six legs takes 10 to 20 MB'),
+        ('logs', logs, 'export ROS_LOG_DIR=/tmp/ros_log, or fix its permissions'),
+    ):
+        place = folder
+        while not place.exists() and place.parent != place:
+            place = place.parent
+        try:
+            with tempfile.TemporaryFile(dir=place):
+                free = shutil.disk_usage(place).free
+        except OSError as error:
+            yield Finding(name, 'problem', f'{place.resolve()}: {error.strerror}', advice)
+            continue
+        text = f'{folder.resolve()}: {free / 1e9:.1f} GB free'
+        status = 'ok' if free > 1e9 or name == 'logs' else 'warning' if free > 1e8 else 'problem'
+        yield Finding(name, status, text, '' if status == 'ok' else advice)
 
 
 def _last_line(text: str) -> str:

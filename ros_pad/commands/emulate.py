@@ -8,9 +8,16 @@ import inspect
 from typing import Any
 
 from ros_pad.commands.command import Commands, add_command
-from ros_pad.errors import InvalidInput
-from ros_pad.regulators.emulate import EMULATORS, LINE_FAULTS, Emulator
-from ros_pad.regulators.serial_device import UNITS
+from ros_pad.configuration import choice
+from ros_pad.regulators.emulate import EMULATORS, Emulator
+
+OPTIONS = (
+    ('unit-ids', str, 'alicat: one letter for each device (default A)'),
+    ('units', str, 'alicat: unit of its pressures (default kPa)'),
+    ('firmware', str, 'alicat: firmware, such as 7v09 (default 10v20)'),
+    ('channels', int, 'serial_text: number of channels (default 6)'),
+    ('full-scale', float, 'highest pressure, Pa gauge (default 100000; alicat 150000)'),
+)
 
 
 def add(commands: Commands) -> None:
@@ -23,22 +30,12 @@ def add(commands: Commands) -> None:
         'pad emulate alicat --unit-ids ABCDEF --link /tmp/regulators --fault silence:10:12',
     )
     part.epilog = '\n'.join(
-        [
-            f'faults of all devices: {", ".join(LINE_FAULTS)}',
-            *(
-                f'faults of {name}: {", ".join(device.FAULTS[len(LINE_FAULTS) :])}'
-                for name, device in EMULATORS.items()
-            ),
-            '',
-            str(part.epilog),
-        ]
+        [f'faults of {name}: {", ".join(EMULATORS[name].FAULTS)}' for name in EMULATORS]
+        + ['', str(part.epilog)]
     )
     part.add_argument('device', choices=sorted(EMULATORS), help='backend whose device is emulated')
     part.add_argument(
-        '--link',
-        metavar='PATH',
-        help='new symbolic link to the port; its path stays the same when the port has another '
-        'name after it was unplugged. If another file takes that path, this ends with status 1',
+        '--link', metavar='PATH', help='new symbolic link to the port, which may change its name'
     )
     part.add_argument(
         '--fault',
@@ -47,44 +44,21 @@ def add(commands: Commands) -> None:
         metavar='KIND[@ADDRESS][:START[:END]]',
         help='fault, with start and end in s from now; may be given more than once',
     )
-    part.add_argument(
-        '--unit-ids', metavar='IDS', help='alicat: one letter for each device (default A)'
-    )
-    part.add_argument(
-        '--units', choices=tuple(UNITS), help='alicat: unit of its pressures (default kPa)'
-    )
-    part.add_argument(
-        '--firmware', metavar='V', help='alicat: firmware, such as 7v09 (default 10v20)'
-    )
-    part.add_argument(
-        '--channels', type=int, metavar='N', help='serial_text: number of channels (default 6)'
-    )
-    part.add_argument(
-        '--full-scale',
-        type=float,
-        metavar='PA',
-        help='highest pressure, Pa gauge (default 100000; alicat 150000)',
-    )
-    part.add_argument(
-        '--time-constant',
-        type=float,
-        metavar='S',
-        help='time constant of the pressure, s (default 0.1)',
-    )
+    for name, kind, text in OPTIONS:
+        part.add_argument(f'--{name}', type=kind, help=text, metavar='VALUE')
 
 
 def run(options: argparse.Namespace) -> int:
     """Answer commands until interrupted; return the exit status."""
-    given: dict[str, Any] = {
-        name: getattr(options, name)
-        for name in ('unit_ids', 'units', 'firmware', 'channels', 'full_scale', 'time_constant')
-        if getattr(options, name) is not None
-    }
-    for name in given:
-        if name not in inspect.signature(EMULATORS[options.device]).parameters:
-            raise InvalidInput(f'--{name.replace("_", "-")} is no option of {options.device}')
-    device = EMULATORS[options.device](schedule=options.fault, **given)
-    with Emulator(device, options.link) as emulator:
+    kind = EMULATORS[options.device]
+    known = [name.replace('_', '-') for name in inspect.signature(kind).parameters]
+    given: dict[str, Any] = {}
+    for name, _, _ in OPTIONS:
+        value = getattr(options, name.replace('-', '_'))
+        if value is not None:
+            choice(f'--{name}: option of {options.device}', name, known)
+            given[name.replace('-', '_')] = value
+    with Emulator(kind(schedule=options.fault, **given), options.link) as emulator:
         print(emulator.path, flush=True)
         emulator.wait()
     return 0

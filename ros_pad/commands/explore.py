@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import socket
+from typing import Any
 
 from ros_pad.commands.command import Commands, add_command
 from ros_pad.configuration import integer
@@ -14,25 +15,16 @@ from ros_pad.errors import InvalidInput
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'explore',
-        run,
+    text = (
         'Show a foot on a page in the browser: dome, sole, grip, force limit and switching time'
-        ' follow the sliders. The page is served to this machine alone, until Ctrl-C.',
-        'pad explore\npad explore small217',
+        ' follow the sliders. The page is served to this machine alone, until Ctrl-C.'
     )
-    part.add_argument(
-        'foot',
-        metavar='FOOT',
-        nargs='?',
-        default='large37',
-        help='foot to begin with: a name in config/feet or a YAML file (default large37)',
-    )
-    part.add_argument(
-        '--port', type=int, metavar='N', help='number of the TCP port (default: a free one)'
-    )
-    part.add_argument('--no-browser', action='store_true', help='do not open a browser')
+    part = add_command(commands, 'explore', run, text, 'pad explore\npad explore small217')
+    add = part.add_argument
+    foot: dict[str, Any] = {'metavar': 'FOOT', 'nargs': '?', 'default': 'large37'}
+    add('foot', help='to begin with: a name in config/feet or YAML file (large37)', **foot)
+    add('--port', type=int, metavar='N', help='number of the TCP port (default: a free one)')
+    add('--no-browser', action='store_true', help='do not open a browser')
 
 
 def run(options: argparse.Namespace) -> int:

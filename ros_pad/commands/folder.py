@@ -14,24 +14,18 @@ PICTURES = ('.png', '.svg', '.pdf')
 
 def new_folder(wanted: pathlib.Path | None, name: str) -> pathlib.Path:
     """Create the folder that ``--out`` gives or, without it, the next free one in ``runs``."""
-    if wanted is not None:
-        refuse_existing('--out', wanted)
-        try:
-            wanted.mkdir(parents=True)
-        except OSError as error:
-            raise PadError(f'--out {wanted}: cannot be created: {error.strerror}') from error
-        return wanted
-    number = 1
+    refuse_existing('--out', wanted)
+    first = wanted or pathlib.Path('runs') / name
+    folder, number = first, 1
     while True:
-        folder = pathlib.Path('runs') / (name if number == 1 else f'{name}_{number}')
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
             number += 1
+            folder = first.with_name(f'{first.name}_{number}')
         except OSError as error:
             raise PadError(
-                f'{folder}: cannot be created: {error.strerror}: change to a folder that you may'
-                ' write to, or give --out'
+                f'{folder}: cannot be created: {error.strerror}: --out gives another folder'
             ) from error
         else:
             return folder

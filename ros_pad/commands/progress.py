@@ -16,11 +16,9 @@ from ros_pad.pace import Progress
 def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterator[Progress]:
     """Show a progress bar on stderr; yield the function that sets its position, 0 to ``total``.
 
-    The bar ends full if the last report came within one reporting interval of the end, or if there
-    was no report. After an early end it stays at the last report. Where stderr is no terminal, it
-    is shown once a minute. With ``delay``, s, it is shown after that time, and only on a terminal.
+    The bar ends full unless an exception ends the block. Where stderr is no terminal, it is shown
+    once a minute. With ``delay``, s, it is shown after that time, and only on a terminal.
     """
-    stride: float | None = None
     terminal = sys.stderr.isatty()
     with tqdm(
         total=total,
@@ -40,10 +38,7 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
             shown.refresh()
 
         def show(place: float) -> None:
-            nonlocal stride
-            stride = max(stride or 0.0, place - shown.n)
             shown.update(place - shown.n)
 
         yield show
-        if stride is None or total - shown.n <= 1.01 * stride:
-            shown.update(total - shown.n)
+        shown.update(total - shown.n)

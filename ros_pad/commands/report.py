@@ -7,9 +7,9 @@ import argparse
 import os
 import pathlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ros_pad.commands.command import Commands, add_command
+from ros_pad.commands.command import FILE, FOLDER, Commands, add_command
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
 from ros_pad.configuration import refuse
@@ -26,37 +26,23 @@ THESIS = 'thesis_figures.html'
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'report',
-        run,
+    text = (
         'Write the HTML report of a bag or of a sweep, or a page with the figures of the thesis '
         'as ros_pad computes them; write figures for a paper.\nA page is one file that needs no '
-        'network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.',
-        'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures',
+        'network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.'
     )
-    part.add_argument(
-        'path', metavar='PATH', nargs='?', type=pathlib.Path, help='folder of a bag or of a sweep'
-    )
-    part.add_argument(
-        '--thesis',
-        action='store_true',
-        help="draw the thesis' figures, without PATH; needs a checkout of ros_pad and about 45 s",
-    )
-    part.add_argument(
-        '--out',
-        type=pathlib.Path,
-        metavar='FILE',
-        help='page to write (default: report.html beside the bag or in the folder of the sweep, '
-        f'{THESIS} in this folder; no page with --figures)',
-    )
-    part.add_argument(
-        '--figures',
-        type=pathlib.Path,
-        metavar='DIR',
-        help='write each figure into this folder as PDF and PNG; no page without --out',
-    )
-    part.add_argument('--force', action='store_true', help='replace existing files')
+    example = 'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures'
+    part = add_command(commands, 'report', run, text, example)
+    add = part.add_argument
+    path: dict[str, Any] = FOLDER | {'metavar': 'PATH', 'nargs': '?'}
+    add('path', help='folder of a bag or of a sweep', **path)
+    text = "draw the thesis' figures, without PATH; needs a checkout of ros_pad and about 45 s"
+    add('--thesis', action='store_true', help=text)
+    text = f'page to write (default: report.html beside bag or sweep, or {THESIS} here)'
+    add('--out', help=text, **FILE)
+    text = 'write each figure into this folder as PDF and PNG; no page without --out'
+    add('--figures', help=text, **FOLDER)
+    add('--force', action='store_true', help='replace existing files')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -64,12 +50,16 @@ def run(options: argparse.Namespace) -> int:
     if options.thesis:
         if options.path is not None:
             raise InvalidInput(f'--thesis draws no bag or sweep: leave out {options.path}')
-        return _of_thesis(options)
+        words = ['--force'] if options.force else []
+        for name in ('out', 'figures'):
+            value = getattr(options, name)
+            words += [f'--{name}', str(value)] if value is not None else []
+        return run_study('thesis', *words)
     if options.path is None:
         raise InvalidInput('PATH (folder of a bag or sweep) or --thesis is needed')
     if not options.path.exists():
         raise BagError(f'{options.path}: no such bag or sweep')
-    from ros_pad.reports import report, sweep_page
+    from ros_pad.reports import report, sweep
 
     if sweeps.is_sweep(options.path):
         page = page_for(options, options.path / 'report.html')
@@ -77,30 +67,18 @@ def run(options: argparse.Namespace) -> int:
         return write_all(
             options,
             page,
-            lambda out: sweep_page.write(found, out, options.force),
-            lambda: sweep_page.draw(found),
+            lambda out: sweep.write(found, out, options.force),
+            lambda: {'sweep': sweep.drawn(found)},
         )
     page = page_for(options, pathlib.Path(os.path.normpath(options.path / '..' / 'report.html')))
     with bar('reading', 1.0, 'bag') as progress:
         trial = recorded.load(options.path, progress=progress)
-
-    def write(out: pathlib.Path) -> None:
-        with bar('report', 1.0, 'page') as progress:
-            report.write(trial, out, force=options.force, progress=progress)
-
-    def drawn() -> dict[str, Drawn]:
-        with bar('drawing', 1.0, 'trial') as progress:
-            return report.drawn(trial, progress=progress)
-
-    return write_all(options, page, write, drawn)
-
-
-def _of_thesis(options: argparse.Namespace) -> int:
-    words = ['--force'] if options.force else []
-    for name in ('out', 'figures'):
-        value = getattr(options, name)
-        words += [f'--{name}', str(value)] if value is not None else []
-    return run_study('thesis', *words)
+    return write_all(
+        options,
+        page,
+        lambda out: report.write(trial, out, force=options.force),
+        lambda: report.drawn(trial),
+    )
 
 
 def page_for(options: argparse.Namespace, default: pathlib.Path) -> pathlib.Path | None:
@@ -125,12 +103,11 @@ def write_all(
     from ros_pad.reports.files import write_figures
 
     if page is not None:
-        write(page)
+        with bar('report', 1.0, 'page'):
+            write(page)
         print(page)
     if options.figures is not None:
-        found = drawn()
-        with bar('figures', 1.0, 'folder') as progress:
-            paths = write_figures(found, options.figures, options.force, progress)
-        for path in paths:
-            print(path)
+        with bar('drawing', 1.0, 'folder'):
+            paths = write_figures(drawn(), options.figures, options.force)
+        print(*paths, sep='\n')
     return 0

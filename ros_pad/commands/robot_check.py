@@ -4,19 +4,27 @@
 from __future__ import annotations
 
 import argparse
+from collections import defaultdict
 from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
 
 from ros_pad.bags import BagReader
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
-from ros_pad.errors import ConfigError
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.sensing import Mapping
-from ros_pad.sensing.checks import Finding
-from ros_pad.sensing.collector import Collector
+from ros_pad.robots.rotation import Array
+from ros_pad.sensing import Mapping, Readings
+from ros_pad.sensing.checks import Check, Recording, check
+
+SHORTEST, FEWEST = 1.0, 10  # s, readings: less is not checked
+
+_Readings = dict[str, list[tuple[Readings, int]]]  # by topic, with the time of arrival, ns
 
 
-def findings(options: argparse.Namespace) -> Iterator[Finding]:
+def findings(options: argparse.Namespace) -> Iterator[Check]:
     """Check the sensors of a robot, and yield what is found; ``ok`` for each topic that is read.
 
     Raises
@@ -30,24 +38,117 @@ def findings(options: argparse.Namespace) -> Iterator[Finding]:
     joints = len(robot.joint_names)
     about = f'{robot.name}: {len(robot.legs)} legs, {joints} joints, {robot.mass:.3g} kg'
     if robot.mass > 0.0:
-        yield Finding('robot', 'ok', about, '')
+        yield Check('robot', 'ok', about)
     else:
-        advice = 'give the links an <inertial> with <mass>: the body estimator needs the weight'
-        yield Finding('robot', 'problem', f'{about}: its links have no mass', advice)
-    collector = Collector(mapping, robot)
-    topics = (_recorded if options.bag else _live)(options, mapping, seconds, collector)
-    for topic, count in collector.counts.items():
-        yield Finding(topic, 'ok', f'{count} messages', '')
-    with bar('checking', 1.0, 'robot') as progress:
-        found = collector.findings(topics, progress)
-        progress(1.0)
-    yield from found
+        text = (
+            'its links have no mass, <inertial> with <mass>: the body estimator needs the weight'
+        )
+        yield Check('robot', 'problem', f'{about}: {text}')
+    messages, topics = (_recorded if options.bag else _live)(options, mapping, seconds)
+    found: _Readings = defaultdict(list)
+    refused: dict[str, str] = {}
+    for topic, message, arrival in messages:
+        try:
+            readings = mapping.read(topic, message, arrival)
+        except InvalidInput as error:
+            refused.setdefault(topic, str(error))
+        else:
+            found[topic].append((readings, arrival))
+    for topic, rows in found.items():
+        yield Check(topic, 'ok', f'{len(rows)} messages')
+    for topic, text in refused.items():
+        yield Check(topic, 'problem', f'messages do not fit the mapping: {text}')
+    yield from silent(mapping, topics, found, refused)
+    for text in mapping.missing:
+        what, _, missing = text.partition(': ')
+        yield Check(what, 'warning', missing)
+    yield from _judged(robot, mapping, found)
+
+
+def silent(
+    mapping: Mapping, topics: dict[str, str], found: _Readings, refused: dict[str, str]
+) -> Iterator[Check]:
+    """Yield the topics without messages; ``topics`` has the type of each that there is."""
+    rows = [each for readings in found.values() for each, _ in readings]
+    efforts = any(each.efforts is not None for each in rows)
+    if efforts and not any(each.forces for each in rows):
+        yield Check('forces', 'ok', 'from the efforts of the joints: no foot force arrives')
+    for source in mapping.sources:
+        needed = source.gyro or source.accelerometer or source.joints or not efforts
+        if needed and source.topic not in {**found, **refused}:
+            same = [name for name, each in topics.items() if each == source.type_name]
+            text = f'no message; {source.type_name} is on {", ".join(same) or "no topic"}'
+            yield Check(source.topic, 'problem', text)
+
+
+def _judged(robot: Robot, mapping: Mapping, found: _Readings) -> Iterator[Check]:
+    """Check the readings against one another, where there are enough of them."""
+    rows = [row for readings in found.values() for row in readings]
+    rows.sort(key=lambda row: row[1])
+    imu = [row for row in rows if row[0].gyro is not None and row[0].accelerometer is not None]
+    joints = [row for row in rows if row[0].positions is not None]
+    short = False
+    for what, readings in (('imu', imu), ('joints', joints)):
+        length = (readings[-1][1] - readings[0][1]) * 1e-9 if len(readings) > FEWEST else 0.0
+        if length < SHORTEST:
+            short = True
+            if found:
+                text = f'readings of {length:.3g} s; at least {SHORTEST:g} s are needed'
+                yield Check(what, 'problem', text)
+    if not short:
+        faults = check(_recording(robot, mapping, imu, joints, rows))
+        if all(each.what == 'not judged' for each in faults):
+            yield Check('sensors', 'ok', 'no fault in rates, stamps, units, axes and signs')
+        yield from faults
+
+
+def _recording(
+    robot: Robot,
+    mapping: Mapping,
+    imu: list[tuple[Readings, int]],
+    joints: list[tuple[Readings, int]],
+    rows: list[tuple[Readings, int]],
+) -> Recording:
+    """Return the readings as arrays; the first stamp of the joints is time 0."""
+    start = joints[0][0].stamp
+
+    def seconds(stamps: list[int]) -> Array:
+        return np.array([stamp - start for stamp in stamps]) * 1e-9
+
+    def column(name: str) -> Array | None:
+        values = [getattr(each, name) for each, _ in joints]
+        return None if any(each is None for each in values) else np.array(values)
+
+    times = seconds([each.stamp for each, _ in joints])
+    forces = None
+    if any(each.forces for each, _ in rows):
+        forces = np.zeros((len(times), len(robot.legs), 3))  # a foot without readings has none
+        for leg in range(len(robot.legs)):
+            own = sorted((each.stamp, *each.forces[leg]) for each, _ in rows if leg in each.forces)
+            for axis in range(3) if own else ():
+                stamps = seconds([row[0] for row in own])
+                forces[:, leg, axis] = np.interp(times, stamps, [row[1 + axis] for row in own])
+    return Recording(
+        robot,
+        seconds([each.stamp for each, _ in imu]),
+        np.array([each.gyro for each, _ in imu]),
+        np.array([each.accelerometer for each, _ in imu]),
+        times,
+        np.array([each.positions for each, _ in joints]),
+        column('velocities'),
+        column('efforts'),
+        forces,
+        mapping.force_axes,
+        mapping.force_kind or 'vector',
+        seconds([at for _, at in imu]),
+        seconds([at for _, at in joints]),
+    )
 
 
 def _live(
-    options: argparse.Namespace, mapping: Mapping, seconds: float, collector: Collector
-) -> dict[str, str]:
-    """Collect messages that arrive; return the types of all topics."""
+    options: argparse.Namespace, mapping: Mapping, seconds: float
+) -> tuple[list[tuple[str, Any, int]], dict[str, str]]:
+    """Return messages that arrive, and the types of all topics."""
     try:
         from ros_pad.nodes.listening import receive
     except ImportError as error:
@@ -56,29 +157,25 @@ def _live(
             ' pip install "ros_pad[ros]", or give a recording with --bag'
         ) from error
     with bar('listening', seconds) as progress:
-        messages, topics = receive(mapping.sources, seconds, options.namespace, progress)
-    for message in messages:
-        collector.add(*message)
-    return topics
+        return receive(mapping.sources, seconds, options.namespace, progress)
 
 
 def _recorded(
-    options: argparse.Namespace, mapping: Mapping, seconds: float, collector: Collector
-) -> dict[str, str]:
-    """Collect the messages of the first seconds of a bag; return the types of all its topics."""
-    with bar('opening', 1.0, 'bag', delay=1.0) as progress:
-        reader = BagReader(options.bag, progress)
+    options: argparse.Namespace, mapping: Mapping, seconds: float
+) -> tuple[list[tuple[str, Any, int]], dict[str, str]]:
+    """Return the messages of the first seconds of a bag, and the types of all its topics."""
+    reader = BagReader(options.bag)
     prefix = f'/{options.namespace.strip("/")}/' if options.namespace else '/'
     names = {
         name: source.topic
         for source in mapping.sources
         for name in (prefix + source.topic.lstrip('/'), source.topic)
     }
-    end = min(reader.start + round(seconds * 1e9), reader.end)
-    with bar('reading', (end - reader.start) * 1e-9) as progress:
+    end, messages = reader.start + round(seconds * 1e9), []
+    with bar('reading', seconds) as progress:
         for topic, message, at in reader.messages(names):
             if at > end:
                 break
-            collector.add(names[topic], message, at)
+            messages.append((names[topic], message, at))
             progress((at - reader.start) * 1e-9)
-    return {topic: of_type for topic, of_type in reader.topics.items() if reader.counts[topic]}
+    return messages, {name: kind for name, kind in reader.topics.items() if reader.counts[name]}

@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from ros_pad.bags import annotate
-from ros_pad.commands.command import INTERRUPTED, Commands, add_command, complain
+from ros_pad.commands.command import FILE, FOLDER, INTERRUPTED, Commands, add_command, complain
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
-from ros_pad.configuration import integer
+from ros_pad.configuration import integer, number
 from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import ConfigError, InvalidInput, PadError
@@ -34,93 +34,67 @@ from ros_pad.trials.others import Others
 from ros_pad.trials.trial import fault_lines
 
 _DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-# Options of a walk: default, and end of the error message if a bench scene is given.
-_ONLY_WALKS = {
-    'policy': (None, 'and gives the morphology of its pad itself'),
-    'cycles': (None, 'in which nothing walks'),
-    'seed': (0, 'in which nothing is random'),
-    'fidelity': ('auto', 'which is calculated, not simulated'),
-    'sensing': ('markers', 'in which nothing is estimated'),
-    'learnt': (None, 'in which nothing is estimated'),
-    'no_compare': (False, 'which has no policies to compare'),
-    'live': (False, 'which has no nodes'),
+# Options of a walk with their defaults, in the order in which they are refused without one.
+_WALK = {
+    'policy': None,
+    'cycles': None,
+    'seed': 0,
+    'fidelity': 'auto',
+    'sensing': 'markers',
+    'learnt': None,
+    'no_ros': False,
+    'no_compare': False,
+    'live': False,
 }
 
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'run',
-        run,
+    text = (
         'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report; for a bench '
-        'scene, draw the figures of the thesis.',
-        'pad run hexapod_patches --seed 3',
+        'scene, draw the figures of the thesis.'
     )
-    part.add_argument('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
-    part.add_argument(
-        '--foot', help="a foot other than the scene's: a name in config/feet or a YAML file"
+    part = add_command(commands, 'run', run, text, 'pad run hexapod_patches --seed 3')
+    add = part.add_argument
+    add('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
+    add('--foot', help="other than the scene's: a name in config/feet or a YAML file")
+    add('--policy', choices=POLICIES, help="chooses morphologies (default: the scene's)")
+    add('--seed', type=int, default=0, help='seed of floor and noise (default 0)')
+    add('--cycles', type=int, help="gait cycles (default: the scene's)")
+    text = (
+        'L0: leg on a rail, L1: robot in the plane, L2: with joints; auto: cheapest that will do'
     )
-    part.add_argument(
-        '--policy', choices=POLICIES, help="rule that chooses morphologies (default: the scene's)"
-    )
-    part.add_argument(
-        '--seed', type=int, default=0, help='seed of floor and noise, 0 to 2147483647 (default 0)'
-    )
-    part.add_argument('--cycles', type=int, help="gait cycles, 1 to 100000 (default: the scene's)")
-    part.add_argument(
-        '--fidelity',
-        choices=levels.FIDELITIES,
-        default='auto',
-        help='L0 is the leg on its rail, L1 a robot in the plane, L2 a robot with joints '
-        '(MuJoCo); auto (default) takes the cheapest that is accurate enough for the scene',
-    )
-    part.add_argument(
-        '--sensing',
-        choices=SOURCES,
-        default='markers',
-        help='what slip is estimated from: markers on the feet (default), or joints, IMU and '
-        'forces in the axes of the feet, as robots have them; joints needs L2',
-    )
-    part.add_argument(
-        '--learnt',
-        type=pathlib.Path,
-        metavar='FILE',
-        help='begin with what feet have learnt of friction: learnt.yaml of an earlier trial',
-    )
-    part.add_argument(
-        '--no-ros', action='store_true', help='walk without nodes and bag; much faster'
-    )
-    part.add_argument(
-        '--no-compare',
-        action='store_true',
-        help='do not also walk the other policies on the same ground, as an adaptive run does',
-    )
-    part.add_argument(
-        '--live',
-        action='store_true',
-        help='share the topics with other processes, by default in the whole subnet: '
-        'real regulators in the same ROS domain receive the set-points',
-    )
-    part.add_argument(
-        '--out',
-        type=pathlib.Path,
-        metavar='DIR',
-        help='new folder for the results (default: runs/<scene>_...)',
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
+    add('--fidelity', choices=levels.FIDELITIES, default='auto', help=text)
+    text = 'what slip is estimated from; joints, with IMU and forces as robots have them, needs L2'
+    add('--sensing', choices=SOURCES, default='markers', help=text)
+    add('--learnt', help='begin with the friction of learnt.yaml of an earlier trial', **FILE)
+    add('--no-ros', action='store_true', help='walk without nodes and bag; much faster')
+    text = 'do not also walk the other policies on the same ground, as an adaptive run does'
+    add('--no-compare', action='store_true', help=text)
+    text = 'share the topics, by default in the whole subnet: real regulators get the set-points'
+    add('--live', action='store_true', help=text)
+    add('--out', help='new folder for the results (default: runs/<scene>_...)', **FOLDER)
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
     """Walk the scene, or run the study of a bench scene; return the exit status."""
     if is_bench(options.scene):
-        return _run_bench(options)
+        _refuse_walk(options, f'{options.scene} is a bench scene, in which nothing walks')
+        words = ['--json'] if options.json else []
+        words += ['--foot', options.foot] if options.foot else []
+        words += ['--out', str(options.out)] if options.out else []
+        return run_study('bench', options.scene, *words)
     scene = Scene.load(options.scene)
     if options.cycles is not None:
         cycles = integer('--cycles', options.cycles, 1, 100000)
         scene = dataclasses.replace(scene, cycles=cycles)
     if options.foot is not None:
-        scene = _on_foot(scene, Foot.load(options.foot))
+        foot = Foot.load(options.foot)
+        if scene.dome_pressure is not None:
+            what = f'--foot {foot.source}: dome_pressure of {scene.name}'
+            number(what, scene.dome_pressure, 'Pa', high=foot.ceiling)
+        scene = dataclasses.replace(scene, foot=foot)
     options.tuning = tuning_for(scene, options.sensing)
     if options.learnt is not None:
         known = learnt.load(options.learnt, scene.foot.source)
@@ -136,8 +110,13 @@ def run(options: argparse.Namespace) -> int:
         check_reach(scene)  # before there is a folder
     suffix = '_joints' if joints else ''
     folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}{suffix}')
+    policies = () if options.no_compare or policy != 'adaptive' else POLICIES
+    compared = [each for each in policies if each != policy]
+    others = Others(scene, compared, options.seed, level, options.sensing, options.tuning)
     try:
-        return _run_in(folder, options, scene, policy, level)
+        # Real regulators may wait for set-points: nothing else takes their time.
+        with contextlib.nullcontext() if options.live else others.beside():
+            return _walk(others, folder, options, (scene, policy, options.seed, level))
     except KeyboardInterrupt:
         bag = folder / 'bag'
         if not bag.exists():
@@ -151,17 +130,22 @@ def run(options: argparse.Namespace) -> int:
             folder.rmdir()
 
 
+def _refuse_walk(options: argparse.Namespace, why: str) -> None:
+    for name, default in _WALK.items():
+        if getattr(options, name) != default:
+            raise InvalidInput(f'--{name.replace("_", "-")} is not allowed: {why}')
+
+
 def _answer(
     options: argparse.Namespace, scene: Scene, policy: str, known: levels.ChosenLevel
 ) -> int:
     """Print the distance of a scene that needs no walk; refuse options of a walk."""
     walks = f'--fidelity {levels.level(scene, policy=policy)} walks it'
-    for name in ('seed', 'learnt', 'no_ros', 'no_compare', 'live', 'out'):
-        if getattr(options, name):
-            raise InvalidInput(
-                f'{_flag(name)} is not allowed: {scene.name} requires its {scene.metric} alone,'
-                f' for which nothing is simulated; {walks}'
-            )
+    asked = argparse.Namespace(**vars(options) | {'policy': None, 'cycles': None})
+    why = f'{scene.name} requires its {scene.metric} alone, for which nothing is simulated'
+    _refuse_walk(asked, f'{why}; {walks}')
+    if options.out:
+        raise InvalidInput(f'--out is not allowed: {why}; {walks}')
     far = levels.sticking_distance(scene)
     if options.json:
         found = {'distance_m': far, 'bound': known.bound, 'note': known.note}
@@ -172,52 +156,15 @@ def _answer(
     return 0
 
 
-def _flag(name: str) -> str:
-    return '--' + name.replace('_', '-')
-
-
-def _run_bench(options: argparse.Namespace) -> int:
-    for name, (default, why) in _ONLY_WALKS.items():
-        if getattr(options, name) != default:
-            raise InvalidInput(
-                f'{_flag(name)} is not allowed: {options.scene} is a bench scene, {why}'
-            )
-    words = ['--json'] if options.json else []
-    words += ['--foot', options.foot] if options.foot else []
-    words += ['--out', str(options.out)] if options.out else []
-    return run_study('bench', options.scene, *words)
-
-
-def _on_foot(scene: Scene, foot: Foot) -> Scene:
-    if scene.dome_pressure is not None and scene.dome_pressure > foot.ceiling:
-        raise InvalidInput(
-            f'--foot {foot.source}: its ceiling of {foot.ceiling:g} Pa is below the dome_pressure'
-            f' of {scene.name}, {scene.dome_pressure:g} Pa'
-        )
-    return dataclasses.replace(scene, foot=foot)
-
-
-def _run_in(
-    folder: pathlib.Path, options: argparse.Namespace, scene: Scene, policy: str, level: str
-) -> int:
-    policies = () if options.no_compare or policy != 'adaptive' else POLICIES
-    compared = [each for each in policies if each != policy]
-    others = Others(scene, compared, options.seed, level, options.sensing, options.tuning)
-    # Real regulators may wait for set-points: nothing else takes their time.
-    with contextlib.nullcontext() if options.live else others.beside():
-        return _run_beside(others, folder, options, scene, policy, level)
-
-
-def _run_beside(
+def _walk(
     others: Others,
     folder: pathlib.Path,
     options: argparse.Namespace,
-    scene: Scene,
-    policy: str,
-    level: str,
+    given: tuple[Scene, str, int, str],
 ) -> int:
+    """Walk scene, policy, seed and level of ``given``; write report and summary."""
+    scene, policy, seed, level = given
     bag = None if options.no_ros else folder / 'bag'
-    given = scene, policy, options.seed, level
     if bag is None:
         with bar(f'{policy}, without ROS', scene.duration) as progress:
             trial = loop.run(*given, progress, options.tuning, sensing=options.sensing)
@@ -238,7 +185,7 @@ def _run_beside(
         about = labels.label(
             scene,
             policy,
-            options.seed,
+            seed,
             level,
             metrics=trial.metrics,
             real_time_factor=trial.real_time_factor,
@@ -252,7 +199,9 @@ def _run_beside(
     if options.json:
         print(json.dumps(summary))
     else:
-        _show(trial, bag)
+        _show(trial)
+        if bag:
+            print(f'bag:      {bag}')
         print(f'report:   {page or "none: without Matplotlib there are no pictures"}')
     if trial.metrics.verdict:
         return complain(f'the walk ended early: {trial.metrics.verdict}', 1)
@@ -288,8 +237,8 @@ def _write_report(trial: Trial, page: pathlib.Path) -> pathlib.Path | None:
     except ConfigError as error:
         complain(error, 0)
         return None
-    with bar('report', 1.0, 'page') as progress:
-        report.write(trial, page, progress=progress)
+    with bar('report', 1.0, 'page'):
+        report.write(trial, page)
     return page
 
 
@@ -308,26 +257,19 @@ def alone() -> Iterator[None]:
 
 
 def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path | None) -> dict[str, Any]:
-    own = trial.metrics
+    own, settings = trial.metrics, trial.settings
     assert own is not None
     return {
-        'scene': trial.scene,
-        'policy': trial.policy,
-        'seed': trial.seed,
-        'fidelity': trial.fidelity,
-        'sensing': trial.settings['sensing'],
-        'fidelity_bound': None if own.verdict else trial.settings['fidelity_bound'],
+        **{name: getattr(trial, name) for name in ('scene', 'policy', 'seed', 'fidelity')},
+        'fidelity_bound': None if own.verdict else settings['fidelity_bound'],
         'fidelity_note': labels.promise(trial),
-        'foot': trial.settings['foot'],
-        'faults': trial.settings['faults'],
+        **{name: settings[name] for name in ('sensing', 'foot')},
         **own.as_dict(),
+        # After the metrics, whose faults are those that the controller found.
+        **{name: settings[name] for name in ('learnt', 'omitted', 'taken', 'comparison')},
         'real_time_factor': trial.real_time_factor,
         'bag': str(bag) if bag else None,
         'report': str(page) if page else None,
-        'learnt': trial.settings['learnt'],
-        'omitted': trial.settings['omitted'],
-        'taken': trial.settings['taken'],
-        'comparison': trial.settings['comparison'],
     }
 
 
@@ -344,16 +286,15 @@ def _at_most(term: dict[str, Any]) -> str:
     return text
 
 
-def _show(trial: Trial, bag: pathlib.Path | None) -> None:
-    own = trial.metrics
+def _show(trial: Trial) -> None:
+    own, settings = trial.metrics, trial.settings
     assert own is not None
     print(
         f'\n{trial.scene}, seed {trial.seed}, {trial.fidelity}: {own.distance_m:.2f} m in'
-        f' {own.cycles:.3g} cycles, {trial.real_time_factor:.1f} times real time'
+        f' {own.cycles:.3g} cycles, {trial.real_time_factor:.1f} times real time\n'
+        f'fidelity: {labels.promise(trial)}\nsensing:  {settings["sensing"]}\n'
     )
-    print(f'fidelity: {labels.promise(trial)}')
-    print(f'sensing:  {trial.settings["sensing"]}\n')
-    rows = [{'policy': trial.policy, **own.as_dict()}, *trial.settings['comparison']]
+    rows = [{'policy': trial.policy, **own.as_dict()}, *settings['comparison']]
     for row in rows:
         if row.get('goal_m') is not None:
             seconds = row['time_to_goal_s']
@@ -361,24 +302,19 @@ def _show(trial: Trial, bag: pathlib.Path | None) -> None:
             print(f'{row["policy"]}: goal of {row["goal_m"]:g} m {after}')
     print(f'policy      mm/cycle  against {trial.policy:8}   slip path per foot   switches')
     for row in rows:
-        advance = row['distance_per_cycle_m']
-        gain = (
-            f'{round(100.0 * (advance / own.distance_per_cycle_m - 1.0)):+d} %'
-            if row is not rows[0] and own.distance_per_cycle_m
-            else ''
-        )
+        advance, gain = row['distance_per_cycle_m'], ''
+        if row is not rows[0] and own.distance_per_cycle_m:
+            gain = f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+.0f} %'
         slip = sum(row['slip_path_m']) / len(row['slip_path_m'])
         print(
             f'{row["policy"]:10} {1e3 * advance:9.1f}  {gain:>16}'
             f' {slip:18.2f} m {sum(row["switches"]):10d}'
         )
-    for refusal in own.refusals:
-        print(f'stayed flat: {refusal}')
-    for fault in fault_lines(own.faults):
-        print(f'fault: {fault}')
-    taken = ', '.join(term['term'] for term in trial.settings['taken'])
-    print(f'modelled: {taken or "none of the terms that may be left out"}')
-    for term in trial.settings['omitted']:
-        print(f'left out: {term["term"]} ({_at_most(term)})')
-    if bag:
-        print(f'bag:      {bag}')
+    taken = ', '.join(term['term'] for term in settings['taken'])
+    print(
+        *(f'stayed flat: {refusal}' for refusal in own.refusals),
+        *(f'fault: {fault}' for fault in fault_lines(own.faults)),
+        f'modelled: {taken or "none of the terms that may be left out"}',
+        *(f'left out: {term["term"]} ({_at_most(term)})' for term in settings['omitted']),
+        sep='\n',
+    )

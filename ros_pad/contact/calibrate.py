@@ -2,46 +2,34 @@
 """Fit the constants of a foot to measurements: stiffness, force limit, friction, film.
 
 Stiffness and the constants of friction are fitted by their logarithms and minimise relative
-errors. A pad of a material has the factor on its stresses, or its thickness, in place of the
-stiffness; free domes give it by relative errors of pressure. The line of the force limit minimises
-absolute errors. Confidence intervals are those of Student's t at 95 %, from the curvature of the
-sum of squares at its minimum.
+errors. A pad of a material has the factor on its stresses in place of the stiffness; free domes
+give it by relative errors of pressure. The line of the force limit minimises absolute errors.
+Confidence intervals are those of Student's t at 95 %, from the curvature of the sum of squares at
+its minimum.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import pathlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ros_pad.configuration import choice, number
-from ros_pad.contact.dome import BURST, inflate, largest_tension, press
+from ros_pad.configuration import number, quantity
+from ros_pad.contact.dome import BURST, inflate, press
 from ros_pad.contact.film import WATER_VISCOSITY
-from ros_pad.contact.fits import (
-    Constant,
-    Fit,
-    Residual,
-    above_zero,
-    fit_positive,
-    kept_constant,
-    line_through,
-)
+from ros_pad.contact.fits import Constant, Residual, fit_positive, kept_constant, line_through
 from ros_pad.contact.foot_file import foot_text
-from ros_pad.contact.friction_fit import WetFloor, fit_friction, friction_residuals
-from ros_pad.contact.hyperelastic import pressure_end, pressure_for_height
+from ros_pad.contact.friction_fit import WetFloor, fit_friction, modelled_forces
+from ros_pad.contact.hyperelastic import pressure_for_height
 from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, force_limit, largest_pressure
-from ros_pad.contact.material import FACTORS, Material
-from ros_pad.contact.measurements import FreeDomes, Measurements
+from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array, MeasuredLimit, Pad, with_constant
 from ros_pad.contact.resistance import LIMIT_SETTINGS, PAD_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
-FITS = ('factor', 'thickness')
-"""What the shapes of domes of a material can be fitted by."""
 # Share by which single points may differ in stiffness before a warning says so.
 _TREND = 0.1
 
@@ -84,7 +72,6 @@ def calibrate(
     film_thickness: float = 3.0e-4,
     viscosity: float = WATER_VISCOSITY,
     *,
-    fit: str | None = None,
     rubber: Pad | None = None,
 ) -> Calibration:
     """Fit the constants of a foot to measurements.
@@ -92,18 +79,15 @@ def calibrate(
     Parameters
     ----------
     measurements : Measurements
-        Measured points. Free domes give ``stiffness`` (pressed domes, if there are no free ones),
-        force limits give the line of the criterion ``measured``, tangential forces give the
-        constants of friction and film.
+        Measured points. Free domes give ``stiffness`` (of a pad of a material, the factor on its
+        stresses), force limits give the line of the criterion ``measured``, tangential forces give
+        the constants of friction and film.
     foot : Foot
         Start of the fit. It gives the radius of the pads and every constant that is not fitted.
     film_thickness : float
         Thickness of the film on the wet floor before the foot touches down, m, above 0.
     viscosity : float
         Viscosity of that liquid, Pa s, above 0.
-    fit : {'factor', 'thickness'}, optional
-        What the shapes of domes give for a pad of a material, by default the factor. Other pads
-        have the stiffness of the thesis' law fitted.
     rubber : Pad, optional
         A pad of a material in place of the foot's pad.
 
@@ -117,101 +101,37 @@ def calibrate(
     InvalidInput
         When nothing can be fitted (the message lists the data that each fit needs), when a
         measurement contradicts the model or the foot, when a fitted constant is out of the range
-        of a foot file, when ``fit`` needs a material and there is none, or when film thickness or
-        viscosity is not finite or not above 0.
+        of a foot file, or when film thickness or viscosity is not finite or not above 0.
     """
     number('film_thickness', film_thickness, 'm', above=True)
     number('viscosity', viscosity, 'Pa s', above=True)
-    start, fit = _start(foot, fit, rubber)
-    constants: list[Constant] = []
+    start = foot.pad if rubber is None else rubber
     warnings: list[str] = []
-    _check_shapes(measurements)
-    if fit == 'stiffness':
-        pad = _stiffness(measurements, start, constants, warnings)
-    else:
-        pad = _of_rubber(measurements, start, fit, constants, warnings)
-    for constant in constants:
-        _fits_a_foot(measurements.source, constant)
-    pad = _limit(measurements, pad, constants, warnings)
-    limit = _criterion(foot, pad, warnings)
-    ceiling = _ceiling(foot.ceiling, pad, limit, warnings)
-    foot = dataclasses.replace(foot, pad=pad, limit=limit, ceiling=ceiling)
-    wet_floor = WetFloor(film_thickness, viscosity)
-    foot = fit_friction(measurements, foot, wet_floor, constants, warnings)
-    _check_constants(measurements.source, fit, constants)
-    residuals = (
-        *_shape_residuals(measurements, pad, len(measurements.free.pressure) >= 1),
-        *_limit_residuals(measurements, pad),
-        *friction_residuals(measurements.friction, foot, wet_floor),
-    )
-    return Calibration(measurements, foot, tuple(constants), residuals, tuple(warnings))
-
-
-def _check_constants(source: str, fit: str, constants: Sequence[Constant]) -> None:
-    """Raise `InvalidInput` if nothing was fitted, or a constant that no foot file may have."""
+    pad, shape = _shape(measurements, start, warnings)
+    _check(measurements.source, [shape])
+    pad, line = _limit(measurements, pad, warnings)
+    foot = _with_pad(foot, pad, warnings)
+    floor = WetFloor(film_thickness, viscosity)
+    foot, friction = fit_friction(measurements, foot, floor, warnings)
+    constants = (shape, *line, *friction)
     if not any(constant.fitted for constant in constants):
         raise InvalidInput(
-            f'{source}: nothing can be fitted: {fit} needs a free dome, or a'
-            ' pressed dome with height or gap; the line of the force limit needs force limits at'
-            ' two pressures; friction needs tangential forces'
+            f'{measurements.source}: nothing can be fitted: {shape.name} needs a free dome; the'
+            ' line of the force limit needs force limits at two pressures; friction needs'
+            ' tangential forces'
         )
+    _check(measurements.source, line)
+    residuals = _residuals(measurements, foot, floor)
+    return Calibration(measurements, foot, constants, residuals, tuple(warnings))
+
+
+def _check(source: str, constants: Sequence[Constant]) -> None:
+    """Raise `InvalidInput` for a fitted constant that no foot file may have."""
     for constant in constants:
-        _fits_a_foot(source, constant)
-
-
-def _start(foot: Foot, fit: str | None, rubber: Pad | None) -> tuple[Pad, str]:
-    """Return the pad from which the fit starts, and what is fitted."""
-    start = foot.pad if rubber is None else rubber
-    if start.edge is not None:
-        raise InvalidInput(
-            f'edge = {start.edge} is not allowed in a calibration: feet are pressed, and shapes'
-            ' under load are not known with an edge; a pad without edge is needed'
-        )
-    if fit is not None:
-        choice('fit', fit, FITS)
-    if start.material is not None:
-        return start, fit or 'factor'
-    if fit is not None:
-        raise InvalidInput(
-            f'fit = {fit!r} is not allowed without a material: a foot whose pad names a material'
-            ' is needed, or material and thickness beside the foot'
-        )
-    return start, 'stiffness'
-
-
-def _criterion(foot: Foot, pad: Pad, warnings: list[str]) -> str:
-    """Return the criterion of the force limit: that of the start foot, or the pad's own line."""
-    if pad.measured_limit not in (None, foot.pad.measured_limit):
-        return 'measured'
-    if foot.limit in criteria(pad):
-        return foot.limit
-    warnings.append(
-        f'the criterion of the force limit becomes {DEFAULT_CRITERION}: none was measured on a pad'
-        ' of this stiffness'
-    )
-    return DEFAULT_CRITERION
-
-
-def _ceiling(ceiling: float, pad: Pad, limit: str, warnings: list[str]) -> float:
-    """Return the foot's ceiling, Pa; lower it to whole kPa if the pad's model ends below."""
-    end = largest_pressure(pad, limit)
-    if ceiling <= end:
-        return ceiling
-    lowered = 1e3 * math.floor(end / 1e3)
-    warnings.append(
-        f'the ceiling is lowered from {ceiling:g} to {lowered:g} Pa: the model of these'
-        f' softer pads ends at {end:.6g} Pa'
-    )
-    return lowered
-
-
-def _fits_a_foot(source: str, constant: Constant) -> None:
-    allowed = _IN_FOOT.get(constant.name)
-    if constant.fitted and allowed and not allowed.low <= constant.value <= allowed.high:
-        raise InvalidInput(
-            f'{source}: the fit gives {constant.name} = {constant.value:.4g} {constant.unit}, but'
-            f' {allowed.allowed} is needed: check the units of the measurements'
-        )
+        allowed = _IN_FOOT.get(constant.name)
+        if constant.fitted and allowed:
+            what = f'{source}: check the units of the measurements: {constant.name}'
+            number(what, constant.value, constant.unit, allowed.low, allowed.high)
 
 
 def foot_file(calibration: Calibration) -> str:
@@ -226,19 +146,13 @@ def foot_file(calibration: Calibration) -> str:
         'Fitted constants have a 95 % interval; all others are those of the start foot.',
         *calibration.warnings,
     ]
-    comments = {constant.name: _comment(constant) for constant in calibration.constants}
+    comments = {}
+    for each in calibration.constants:
+        between = 'too few for an interval'
+        if not math.isnan(each.low):
+            between = f'{each.low:.4g} to {each.high:.4g}, {each.points} points'
+        comments[each.name] = f'fitted: {between}' if each.fitted else 'of the start foot'
     return foot_text(foot, f'{foot.source}, calibrated', head, comments)
-
-
-def _comment(constant: Constant) -> str:
-    if not constant.fitted:
-        return 'kept'
-    if math.isnan(constant.low):
-        return f'fitted to {constant.points} points, too few for an interval'
-    return f'fitted: {constant.low:.4g} to {constant.high:.4g} ({constant.points} points)'
-
-
-# --- stiffness -----------------------------------------------------------------------------------
 
 
 def stiffness_of(pad: Pad, pressure: Array, height: Array) -> Array:
@@ -267,8 +181,8 @@ def from_pressures(pad: Pad, name: str, pressure: Array, height: Array) -> Const
     Parameters
     ----------
     pad : Pad
-        The pad; ``factor`` and ``thickness`` are those of its material.
-    name : {'stiffness', 'factor', 'thickness'}
+        The pad; ``factor`` is that of its material.
+    name : {'stiffness', 'factor'}
         The constant.
     pressure, height : array
         Gauge pressure, Pa, and height, m, above 0, of each dome.
@@ -281,190 +195,71 @@ def from_pressures(pad: Pad, name: str, pressure: Array, height: Array) -> Const
     if name == 'stiffness':
         each = pressure / stiffness_of(pad, pressure, height)
     else:
-        each = pressure_for_height(pad, height) / _value(pad, name)
+        assert pad.material is not None
+        each = pressure_for_height(pad, height) / pad.material.factor
     fit = line_through((each / pressure)[:, None], np.ones_like(pressure))
-    fit = dataclasses.replace(fit, half_widths=fit.half_widths / fit.values, logarithmic=True)
-    unit = {'stiffness': 'N/m', 'factor': '(factor)', 'thickness': 'm'}[name]
-    return fit.constant(name, unit, 'free domes')
+    fit = replace(fit, half_widths=fit.half_widths / fit.values, logarithmic=True)
+    return fit.constant(name, {'stiffness': 'N/m', 'factor': '(factor)'}[name], 'free domes')
 
 
-def _check_shapes(measurements: Measurements) -> None:
-    """Raise `InvalidInput` for pressures and lengths of domes that are not above 0."""
-    free, pressed = measurements.free, measurements.pressed
-    for name, values in (
-        ('height', free.height),
-        ('pressure of a free dome', free.pressure),
-        ('pressure of a pressed dome', pressed.pressure),
-        ('height of a pressed dome', pressed.height),
-        ('gap', pressed.gap),
+def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[Pad, Constant]:
+    """Return the pad with the stiffness or factor that its free domes give, and this constant."""
+    source, free, pressed = measurements.source, measurements.free, measurements.pressed
+    for name, values, unit in (
+        ('height', free.height, 'm'),
+        ('pressure of a free dome', free.pressure, 'Pa'),
+        ('pressure of a pressed dome', pressed.pressure, 'Pa'),
+        ('height of a pressed dome', pressed.height, 'm'),
+        ('gap', pressed.gap, 'm'),
     ):
-        above_zero(measurements.source, name, values)
-
-
-def _stiffness(
-    measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
-) -> Pad:
-    """Return the pad with its fitted stiffness; add constants and warnings."""
-    free = measurements.free
-    if len(free.pressure):
-        least = float(free.pressure.max()) * pad.radius / BURST
+        quantity(f'{source}: {name}', values[~np.isnan(values)], unit, above=True)
+    material = pad.material
+    if material is None:
+        name, unit, value = 'stiffness', 'N/m', pad.stiffness
+    else:
+        name, unit, value = 'factor', '(factor)', material.factor
+    if not len(free.pressure):
+        return pad, kept_constant(name, unit, value, 'no free dome was measured')
+    if material is None:
 
         def heights(k: Array) -> Array:
-            return np.asarray(
-                inflate(with_constant(pad, 'stiffness', float(k[0])), free.pressure).height
+            return np.asarray(inflate(replace(pad, stiffness=float(k[0])), free.pressure).height)
+
+        least = float(free.pressure.max()) * pad.radius / BURST
+        fit = fit_positive(heights, free.height, [value], [least], [math.inf])
+        found = fit.constant(name, unit, "of the thesis' law, free domes")
+        each = stiffness_of(pad, *free)[np.argsort(free.pressure)]
+        if len(each) > 2 and abs(each[-1] / each[0] - 1.0) > _TREND:
+            warnings.append(
+                f'one stiffness does not fit all points: single points give {each[0]:.3g} N/m at'
+                f' {free.pressure.min():g} Pa and {each[-1]:.3g} N/m at {free.pressure.max():g} Pa'
             )
-
-        fit = fit_positive(heights, free.height, [pad.stiffness], [least])
-        constants.append(fit.constant('stiffness', 'N/m', "of the thesis' law, free domes"))
-        _warn_of_trend(pad, free, warnings)
-        return with_constant(pad, 'stiffness', float(fit.values[0]))
-    fit_pressed = _from_pressed(measurements, pad, 'stiffness')
-    if fit_pressed is None:
-        constants.append(kept_constant('stiffness', 'N/m', pad.stiffness, 'no dome was measured'))
-        return pad
-    note = "of the thesis' law, pressed domes"
-    constants.append(fit_pressed.constant('stiffness', 'N/m', note))
-    return with_constant(pad, 'stiffness', float(fit_pressed.values[0]))
-
-
-def _warn_of_trend(pad: Pad, free: FreeDomes, warnings: list[str]) -> None:
-    """Warn where the lowest and the highest pressure ask for another stiffness."""
-    each = stiffness_of(pad, *free)[np.argsort(free.pressure)]
-    if len(each) > 2 and abs(each[-1] / each[0] - 1.0) > _TREND:
-        warnings.append(
-            f'one stiffness does not fit all points: single points give {each[0]:.3g} N/m at'
-            f' {free.pressure.min():g} Pa and {each[-1]:.3g} N/m at {free.pressure.max():g} Pa'
-        )
-
-
-def _from_pressed(measurements: Measurements, pad: Pad, name: str) -> Fit | None:
-    """Fit a constant of the pad to height or gap of pressed domes; None if neither is measured."""
-    pressed = measurements.pressed
-    wall = np.where(np.isnan(pressed.height), pressed.gap, pressed.height)
-    known = ~np.isnan(wall)
-    if not known.any():
-        return None
-    start = _value(pad, name)
-    if name == 'stiffness':
-        end = largest_tension(0.01) * start / pad.radius
-    else:
-        end = pressure_end(pad)[0]
-    least = start * float(pressed.pressure[known].max()) / end
-    if name == 'factor':
-        least = max(least, FACTORS[0])
-
-    def walls(value: Array) -> Array:
-        changed = with_constant(pad, name, float(value[0]))
-        dome = press(changed, pressed.pressure[known], pressed.force[known])
-        by_gap = np.isnan(pressed.height[known])
-        return np.asarray(np.where(by_gap, dome.gap, dome.height))
-
-    most = {'factor': FACTORS[1], 'thickness': pad.radius}.get(name, math.inf)
-    fit = None if least >= most else fit_positive(walls, wall[known], [start], [least], [most])
-    if fit is None or np.isnan(fit.values).any():
-        raise InvalidInput(
-            f'{measurements.source}: the pressed domes carry more than the model of a pad of '
-            f'radius = {pad.radius:g} m allows at their pressure: check the radius in the foot'
-            ' file'
-        )
-    return fit
-
-
-def _value(pad: Pad, name: str) -> float:
-    if name == 'factor':
-        return pad.material.factor  # type: ignore[union-attr]
-    return float(getattr(pad, name))
-
-
-def _of_rubber(
-    measurements: Measurements,
-    pad: Pad,
-    name: str,
-    constants: list[Constant],
-    warnings: list[str],
-) -> Pad:
-    """Return the pad with its fitted factor or thickness; add constants and warnings."""
-    material, free = pad.material, measurements.free
-    assert material is not None
+        return with_constant(pad, name, found.value), found
     made = material.name or str(material)
-    what = {'factor': f'on the stresses of {made}', 'thickness': f'of the sheet of {made}'}[name]
-    if len(free.pressure):
-        try:
-            found = from_pressures(pad, name, *free)
-        except InvalidInput as error:
-            raise InvalidInput(f'{measurements.source}: {error}') from error
-    else:
-        unit = {'factor': '(factor)', 'thickness': 'm'}[name]
-        by_pressed = _from_pressed(measurements, pad, name)
-        if by_pressed is None:
-            constants.append(kept_constant(name, unit, _value(pad, name), 'no dome was measured'))
-            return pad
-        found = by_pressed.constant(name, unit, 'pressed domes')
-    constants.append(dataclasses.replace(found, note=f'{what}, {found.note}'))
     try:
+        found = from_pressures(pad, name, *free)
+        found = replace(found, note=f'on the stresses of {made}, {found.note}')
         pad = with_constant(pad, name, found.value)
-        if name == 'factor':
-            pad = _with_range(pad, material, found, warnings)
     except InvalidInput as error:
-        raise InvalidInput(
-            f'{measurements.source}: the fit gives no pad: {error}: check the units of the'
-            ' measurements'
-        ) from error
-    return pad
-
-
-def _with_range(pad: Pad, material: Material, factor: Constant, warnings: list[str]) -> Pad:
-    """Return the pad with the interval of its factor; warn whether the doubts explain it."""
+        raise InvalidInput(f'{source}: {error}: check the units of the measurements') from error
     low, high = material.factor_range or (1.0, 1.0)
-    name = material.name or str(material)
-    if low <= factor.value <= high:
-        warnings.append(
-            f'the factor {factor.value:.3g} is one that the doubts about {name} explain'
-            f' ({low:g} to {high:g}): {material.doubts or "they are not stated"}'
-        )
+    if low <= found.value <= high:
+        words = f'one that the doubts about {made} explain ({low:g} to {high:g})'
     else:
-        warnings.append(
-            f'the factor {factor.value:.3g} is outside {low:g} to {high:g}, which the doubts about'
-            f' {name} explain: check the material, the units, and the thickness of'
-            f' {pad.thickness:g} m, to which pressures are in proportion'
+        words = (
+            f'outside {low:g} to {high:g}, which the doubts about {made} explain: check the'
+            f' material, the units, and the thickness of {pad.thickness:g} m'
         )
-    if math.isnan(factor.low):
-        return pad
-    measured = material.times(factor.value, (factor.low, factor.high))
-    return dataclasses.replace(pad, material=measured)
-
-
-def _shape_residuals(measurements: Measurements, pad: Pad, used_free: bool) -> list[Residual]:
-    free, pressed = measurements.free, measurements.pressed
-    residuals = []
-    modelled = inflate(pad, free.pressure).height if len(free.pressure) else []
-    for p, height, model in zip(*free, modelled, strict=True):
-        residuals.append(Residual('height', f'free, {p:g} Pa', p, height, float(model), True))
-    if not len(pressed.pressure):
-        return residuals
-    dome = press(pad, pressed.pressure, pressed.force)
-    for name in ('height', 'depth', 'contact_radius', 'gap'):
-        for p, force, value, model in zip(
-            pressed.pressure,
-            pressed.force,
-            getattr(pressed, name),
-            getattr(dome, name),
-            strict=True,
-        ):
-            if not math.isnan(value):
-                used = not used_free and name in ('height', 'gap')
-                setting = f'{p:g} Pa, {force:g} N'
-                residuals.append(Residual(name, setting, p, value, float(model), used))
-    return residuals
-
-
-# --- force limit ---------------------------------------------------------------------------------
+    warnings.append(f'the factor {found.value:.3g} is {words}')
+    if not math.isnan(found.low):
+        pad = replace(pad, material=material.times(found.value, (found.low, found.high)))
+    return pad, found
 
 
 def _limit(
-    measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
-) -> Pad:
-    """Return the pad with the fitted line of its force limit; add constants and warnings."""
+    measurements: Measurements, pad: Pad, warnings: list[str]
+) -> tuple[Pad, list[Constant]]:
+    """Return the pad with the fitted line of its force limit, and the constants of this line."""
     pressure, limit = measurements.force_limits
     if len(np.unique(pressure)) < 2:
         if len(pressure):
@@ -473,39 +268,83 @@ def _limit(
                 ' one pressure, and a line needs two'
             )
         line = pad.measured_limit
-        if line is not None:
-            note = "the start foot's line"
-            at = f'{note}, on one pad at {line.pressure:g} Pa'
-            constants.append(kept_constant('force_limit', 'N', line.force, at))
-            constants.append(kept_constant('force_limit_slope', 'N/Pa', line.slope, note))
-        return pad
+        if line is None:
+            return pad, []
+        at = f"the start foot's line, on one pad at {line.pressure:g} Pa"
+        slope = kept_constant('force_limit_slope', 'N/Pa', line.slope, "the start foot's line")
+        return pad, [kept_constant('force_limit', 'N', line.force, at), slope]
     middle = float(pressure.mean())
     fit = line_through(np.column_stack([np.ones_like(pressure), pressure - middle]), limit)
-    force, slope = fit.values
-    if slope <= 0.0 or force < 0.0:
-        raise InvalidInput(
-            f'{measurements.source}: the line through the measured force limits has slope ='
-            f' {slope:.3g} N/Pa and a force of {force:.3g} N at {middle:g} Pa: a slope above 0 and'
-            ' a force of at least 0 N are needed'
-        )
     at = f'line of the force limit of one pad, at {middle:g} Pa'
-    constants.append(fit.constant('force_limit', 'N', at, 0))
-    constants.append(fit.constant('force_limit_slope', 'N/Pa', 'slope of this line', 1))
-    return dataclasses.replace(
-        pad, measured_limit=MeasuredLimit(float(force), middle, float(slope))
-    )
-
-
-def _limit_residuals(measurements: Measurements, pad: Pad) -> list[Residual]:
-    pressure, limit = measurements.force_limits
-    if not len(pressure):
-        return []
-    used = pad.measured_limit is not None
-    criterion = 'measured' if used else DEFAULT_CRITERION
-    known = pressure <= largest_pressure(pad, criterion)
-    modelled = force_limit(pad, np.where(known, pressure, 0.0), criterion)
-    modelled = np.where(known, modelled, np.nan)
-    return [
-        Residual('force_limit', f'{p:g} Pa', p, value, float(model), used)
-        for p, value, model in zip(pressure, limit, modelled, strict=True)
+    force = fit.constant('force_limit', 'N', at, 0)
+    slope = fit.constant('force_limit_slope', 'N/Pa', 'slope of this line', 1)
+    where = f'{measurements.source}: the line through the measured force limits'
+    number(f'{where}: slope', slope.value, 'N/Pa', above=True)
+    number(f'{where}: force at {middle:g} Pa', force.value, 'N')
+    return replace(pad, measured_limit=MeasuredLimit(force.value, middle, slope.value)), [
+        force,
+        slope,
     ]
+
+
+def _with_pad(foot: Foot, pad: Pad, warnings: list[str]) -> Foot:
+    """Return the foot with a pad, a criterion of the force limit that this has, and its ceiling.
+
+    The ceiling is lowered to whole kPa if the pad's model ends below.
+    """
+    limit, ceiling = foot.limit, foot.ceiling
+    if pad.measured_limit not in (None, foot.pad.measured_limit):
+        limit = 'measured'
+    elif limit not in criteria(pad):
+        limit = DEFAULT_CRITERION
+        warnings.append(
+            f'the criterion of the force limit becomes {limit}: none was measured on a pad of this'
+            ' stiffness'
+        )
+    end = largest_pressure(pad, limit)
+    if ceiling > end:
+        ceiling = 1e3 * math.floor(end / 1e3)
+        warnings.append(
+            f'the ceiling is lowered from {foot.ceiling:g} to {ceiling:g} Pa: the model of these'
+            f' softer pads ends at {end:.6g} Pa'
+        )
+    return replace(foot, pad=pad, limit=limit, ceiling=ceiling)
+
+
+def _residuals(measurements: Measurements, foot: Foot, floor: WetFloor) -> tuple[Residual, ...]:
+    """Return all measured numbers beside those of the foot."""
+    pad, free, pressed = foot.pad, measurements.free, measurements.pressed
+    found: list[Residual] = []
+
+    def add(
+        name: str, settings: Sequence[str], p: Array, measured: Array, modelled: Array, used: bool
+    ) -> None:
+        for row in np.flatnonzero(~np.isnan(measured)).tolist():
+            at, value, model = (float(each[row]) for each in (p, measured, modelled))
+            found.append(Residual(name, settings[row], at, value, model, used))
+
+    if len(free.pressure):
+        words = [f'free, {p:g} Pa' for p in free.pressure]
+        add('height', words, *free, np.asarray(inflate(pad, free.pressure).height), True)
+    if len(pressed.pressure):
+        dome = press(pad, pressed.pressure, pressed.force)
+        words = [f'{p:g} Pa, {f:g} N' for p, f in zip(*pressed[:2], strict=True)]
+        for name in ('height', 'depth', 'contact_radius', 'gap'):
+            model = np.asarray(getattr(dome, name))
+            add(name, words, pressed.pressure, getattr(pressed, name), model, False)
+    pressure, limit = measurements.force_limits
+    if len(pressure):
+        used = pad.measured_limit is not None
+        criterion = 'measured' if used else DEFAULT_CRITERION
+        known = pressure <= largest_pressure(pad, criterion)
+        model = np.asarray(force_limit(pad, np.where(known, pressure, 0.0), criterion))
+        words = [f'{p:g} Pa' for p in pressure]
+        add('force_limit', words, pressure, limit, np.where(known, model, np.nan), used)
+    rows = measurements.friction
+    words = [
+        f'{f"domes of {p:g} Pa" if p > 0.0 else "flat"}, {"wet" if wet else "dry"}, {load:g} N'
+        for p, load, wet in zip(rows.pressure, rows.load, rows.wet, strict=True)
+    ]
+    model = modelled_forces(rows, foot, floor)
+    add('tangential_force', words, rows.pressure, rows.tangential_force, model, True)
+    return tuple(found)

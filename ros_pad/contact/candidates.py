@@ -9,22 +9,22 @@ the supply its dome is lower and may carry less. Extremes inside the range are w
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ros_pad.configuration import number
 from ros_pad.contact.design import pads_for
 from ros_pad.contact.dome import inflate
-from ros_pad.contact.hyperelastic import highest_dome, pressure_end, pressure_for_height
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import force_limit, pressure_for
 from ros_pad.contact.material import Material
 from ros_pad.contact.pad import MeasuredLimit, Pad, with_constant
 from ros_pad.errors import NoEquilibrium
-from ros_pad.pace import Progress
 
 # Factors over the range of a material.
 _FACTORS = 9
@@ -49,8 +49,7 @@ class Candidate:
     pads : int
         Number of pads that share the load.
     pressure : Span
-        Lowest pressure for the load with its margin, and for the height, Pa gauge; infinite where
-        none is enough.
+        Lowest pressure for the load with its margin, Pa gauge; infinite where none is enough.
     height : Span
         Height of the free dome at this pressure, m; of the largest dome where none is enough.
     load : Span
@@ -94,9 +93,7 @@ def candidates(
     ceiling: float = 90e3,
     margin: float = 1.2,
     criterion: str = 'flattening',
-    height: float = 0.0,
     measured_limit: MeasuredLimit | None = None,
-    progress: Progress | None = None,
 ) -> tuple[Candidate, ...]:
     """Return pads of each material and thickness for a load.
 
@@ -120,12 +117,8 @@ def candidates(
         Safety factor on the load, above 0.
     criterion : str
         Criterion of the force limit, one of :func:`ros_pad.contact.limits.criteria`.
-    height : float
-        Least height of the free dome, m, from 0.
     measured_limit : MeasuredLimit, optional
         Force limits measured on such pads.
-    progress : callable, optional
-        Called with the share that is done.
 
     Raises
     ------
@@ -135,60 +128,33 @@ def candidates(
     number('load', load, 'N', above=True)
     number('ceiling', ceiling, 'Pa', above=True)
     number('margin', margin, '(factor)', above=True)
-    number('height', height, 'm')
-    found: list[Candidate] = []
-    for material in materials:
-        for thickness in thicknesses:
-            pad = Pad.of(material, radius, thickness, measured_limit)
-            count = pads_for(area, pad, pads)
-            asked = _Asked(count, load, ceiling, margin, criterion, height)
-            found.append(_candidate(pad, asked))
-            if progress is not None:
-                progress(len(found) / (len(materials) * len(thicknesses)))
+    found = []
+    for material, thickness in itertools.product(materials, thicknesses):
+        pad = Pad.of(material, radius, thickness, measured_limit)
+        count = pads_for(area, pad, pads)
+        force = load / count  # on one pad
+        states = []
+        for factor in _factors(pad, force * margin, ceiling, criterion):
+            own = with_constant(pad, 'factor', factor)
+            end = pressure_end(own)[0]
+            try:
+                pressure = pressure_for(own, force, criterion, margin)
+            except NoEquilibrium:
+                pressure = math.inf
+            height = inflate(own, min(pressure, end)).height
+            # force_limit can refuse the end itself because of rounding.
+            limit = force_limit(own, min(ceiling, end * (1.0 - 1e-15)), criterion)
+            states.append((pressure, height, count * limit / margin, end, end / pressure))
+        enough = [state[0] <= ceiling for state in states]
+        spans = [Span(each[0], min(each), max(each)) for each in zip(*states, strict=True)]
+        carried = 'yes' if all(enough) else 'in doubt' if any(enough) else 'no'
+        balloons = pressure_end(pad)[1] == 'no_inflation'
+        needed, high, reach, largest, over = spans
+        found.append(Candidate(pad, count, needed, high, reach, largest, balloons, over, carried))
     return tuple(found)
 
 
-class _Asked(NamedTuple):
-    """Number of pads, and what is asked of them; see :func:`candidates`."""
-
-    pads: int
-    load: float
-    ceiling: float
-    margin: float
-    criterion: str
-    height: float
-
-
-class _State(NamedTuple):
-    """The quantities of a candidate for one factor, or their spans."""
-
-    pressure: Any
-    height: Any
-    load: Any
-    largest_pressure: Any
-    ballooning_margin: Any
-
-
-def _candidate(pad: Pad, asked: _Asked) -> Candidate:
-    states = [
-        _state(with_constant(pad, 'factor', factor), asked) for factor in _factors(pad, asked)
-    ]
-    enough = [state.pressure <= asked.ceiling for state in states]
-    spans = _State(*(Span(each[0], min(each), max(each)) for each in zip(*states, strict=True)))
-    return Candidate(
-        pad=pad,
-        pads=asked.pads,
-        pressure=spans.pressure,
-        height=spans.height,
-        load=spans.load,
-        largest_pressure=spans.largest_pressure,
-        balloons=pressure_end(pad)[1] == 'no_inflation',
-        ballooning_margin=spans.ballooning_margin,
-        carried='yes' if all(enough) else 'in doubt' if any(enough) else 'no',
-    )
-
-
-def _factors(pad: Pad, asked: _Asked) -> list[float]:
+def _factors(pad: Pad, force: float, ceiling: float, criterion: str) -> list[float]:
     """Return the factor of a pad's material, and factors over the range of the doubts about it.
 
     Among them are those at which the largest pressure is the ceiling, and at which the pad just
@@ -197,35 +163,9 @@ def _factors(pad: Pad, asked: _Asked) -> list[float]:
     material = pad.material
     assert material is not None and material.factor_range is not None
     end = pressure_end(pad)[0] * (1.0 - 1e-15)
-    force = asked.load * asked.margin / asked.pads
-    strongest = force_limit(pad, end, asked.criterion)
-    kinks = [
-        asked.ceiling / end,
-        force / strongest * (1.0 + 1e-9) if strongest > 0.0 else math.inf,
-    ]
+    strongest = force_limit(pad, end, criterion)
+    kinks = [ceiling / end, force / strongest * (1.0 + 1e-9) if strongest > 0.0 else math.inf]
     low, high = material.factor_range
     inside = [material.factor * each for each in kinks if low < material.factor * each < high]
     spread = np.linspace(low, high, _FACTORS).tolist() if low < high else []
     return [material.factor, *spread, *inside]
-
-
-def _state(pad: Pad, asked: _Asked) -> _State:
-    height, margin = asked.height, asked.margin
-    end = pressure_end(pad)[0]
-    try:
-        pressure = pressure_for(pad, asked.load / asked.pads, asked.criterion, margin)
-    except NoEquilibrium:
-        pressure = math.inf
-    if height > highest_dome(pad):
-        pressure = math.inf
-    elif height > 0.0:
-        pressure = max(pressure, float(pressure_for_height(pad, np.array([height]))[0]))
-    # force_limit can refuse the end itself because of rounding.
-    limit = force_limit(pad, min(asked.ceiling, end * (1.0 - 1e-15)), asked.criterion)
-    return _State(
-        pressure,
-        inflate(pad, min(pressure, end)).height,
-        asked.pads * limit / margin,
-        end,
-        end / pressure,
-    )

@@ -24,9 +24,6 @@ from ros_pad.errors import InvalidInput, NoEquilibrium
 DOME = 1.5
 # Floor area per pad over radius²: hexagon around that sphere (3.87).
 CELL = 2.0 * math.sqrt(3.0) * DOME**2
-# Area over squared radius above which a float cannot hold the exact number of pads.
-_MOST_PADS = 2.0**53
-
 # The liquid of figure 10 of the thesis: water at a contact angle of 60 degrees.
 DESIGN_WATER = Liquid(surface_tension=0.073, solid_tension=0.0410625, contact_angle=math.pi / 3)
 """Water with the contact angle of the design in the thesis (3.101), 60 degrees."""
@@ -230,7 +227,7 @@ def design(
         :func:`ros_pad.contact.limits.largest_pressure` of the criterion.
     margin : float
         Safety factor on the load, above 0.
-    criterion : {'thickness', 'wall', 'flattening', 'max_depth', 'measured'}
+    criterion : {'thickness', 'flattening', 'measured'}
         Criterion of the force limit.
     liquid : Liquid
         Liquid for the rise height.
@@ -289,22 +286,17 @@ def design(
 
 def pads_for(area: float, pad: Pad, pads: int | None = None) -> int:
     """Return the number of pads on a sole: the given one if allowed, or else as many as fit."""
-    if area >= _MOST_PADS * pad.radius**2:
-        least = math.sqrt(area / _MOST_PADS)
-        raise InvalidInput(
-            f'radius = {pad.radius:g} m is not allowed on an area of {area:g} m²: at least'
-            f' {least:.3g} m is needed, because more than 2^53 pads cannot be counted exactly'
-        )
+    cell = CELL * pad.radius**2
+    # A float cannot hold the exact number of more than 2^53 pads.
+    number(f'area for pads of radius {pad.radius:g} m', area, 'm²', 0.0, 2.0**53 * cell)
     if pads is not None:
         return integer('pads', pads, 1, math.floor(area / (math.pi * pad.radius**2)))
     # Rounding must not remove a pad from a sole whose area is a whole number of cells.
-    fitting = math.floor(pads_in(area, pad.radius) * (1.0 + 1e-12))
-    if fitting < 1:
-        raise InvalidInput(
-            f'area = {area:g} m² is not allowed: at least {CELL * pad.radius**2:g} m² is'
-            f' needed for one pad of radius {pad.radius:g} m'
-        )
-    return fitting
+    share = area / cell * (1.0 + 1e-12)
+    number(
+        f'area for one pad of radius {pad.radius:g} m', area, 'm²', cell if share < 1.0 else 0.0
+    )
+    return math.floor(share)
 
 
 def _width(pad: Pad, pressure: float) -> float:

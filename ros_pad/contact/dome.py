@@ -4,28 +4,23 @@
 Units inside this module: lengths are divided by the pad radius, pressure is ``P = p r/k``, force
 is ``f = F/(pi k r)`` and adhesion is ``a = sign * adhesion_energy/k``. In these units all pads are
 the same, and pi appears only in the force.
-
-The formulas work on floats and on arrays; the matching square root is passed in. A single dome is
-found by Newton's method inside a bracket. A batch takes three or four plain Newton steps from a
-polynomial start value. Rows that fail the certificate of the branch go to the solver for one dome.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, NoReturn, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice, instance, quantity
+from ros_pad.configuration import choice, instance, number, quantity
 from ros_pad.contact.pad import Array, Floats, Pad, broadcast
-from ros_pad.errors import InvalidInput, NoEquilibrium
+from ros_pad.errors import NoEquilibrium
 
-# Sign of the adhesion term: the program in the appendix of the thesis adds this term, the text
-# (3.43) subtracts it.
-ADHESION_SIGNS = {'matlab': 1.0, 'text': -1.0, 'none': 0.0}
+# Sign of the adhesion term: the program in the appendix of the thesis adds this term.
+ADHESION_SIGNS = {'matlab': 1.0, 'none': 0.0}
 MODELS = ('thesis', 'membrane')
 
 # Pressure ``P`` from which on the free dome grows without limit and has no equilibrium.
@@ -36,23 +31,16 @@ LARGEST_ADHESION = 0.01
 Codes: TypeAlias = npt.NDArray[np.int8]
 STATUS = np.array(['ok', 'no_contact', 'flattened', 'fold_zone', 'no_inflation', 'out_of_range'])
 OK, NO_CONTACT, FLATTENED, FOLD_ZONE, NO_INFLATION, OUT_OF_RANGE = range(6)
-# Least-squares fits for start values of Newton's method; they affect time, not results.
-# tan of half the edge angle of the free dome, over P, by falling powers of P up to 6: error 4e-4.
-_FREE_SEED = (
-    *(1.50052e-07, -6.18748e-06, 1.0885e-04, -1.0662e-03, 6.39084e-03),
-    *(-2.41485e-02, 5.63496e-02, -7.00170e-02, 3.55966e-03, 2.49909e-01),
-)
-# Pressed height over ``P (1 - f/P)``: rows by falling powers of P, columns by those of f/P. The
-# error is below 4e-3 in half of the domain, up to 0.4 at high pressure and large force.
-_PRESSED_SEED = (
-    (-0.0081003, 0.030039, -0.019133, 0.0054206),
-    (-0.16593, 0.12952, 0.013939, -0.0083308),
-    (0.38013, -0.5985, 0.27807, -0.034428),
-    (-0.15422, 0.3986, -0.50011, 0.50239),
-)
 
-# Rows of a batch computed at a time, so that temporary arrays fit the processor's cache.
-_CHUNK = 16384
+# Lengths, status codes, and by code the most that is allowed: a force, N, or a pressure, Pa.
+Solved: TypeAlias = tuple[Array, Codes, dict[int, float]]
+
+_WHY = {
+    FLATTENED: 'the contact would cover the whole pad: a force below {:.6g} N is needed',
+    FOLD_ZONE: 'the shape depends on the history of the load: at most {:.6g} Pa is allowed',
+    NO_INFLATION: 'it would balloon: the pressure has its maximum at {:.6g} Pa',
+    OUT_OF_RANGE: 'it would leave the range of its material: at most {:.6g} Pa is allowed',
+}
 
 
 class Inflated(NamedTuple):
@@ -115,7 +103,7 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     pressure : float or array
         Gauge pressure, Pa, from 0; below ``6 stiffness/radius`` there is exactly one dome. A pad
         of a material ends at its maximum pressure, or at the end of the material's range
-        (:mod:`ros_pad.contact.hyperelastic`) or, with an edge, of the correction for thickness.
+        (:mod:`ros_pad.contact.hyperelastic`).
 
     Returns
     -------
@@ -150,23 +138,10 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     if pad.material is not None:
         from ros_pad.contact.hyperelastic import inflate_rubber
 
-        return inflate_rubber(pad, p)
-    if isinstance(p, float):
-        p = float(p)
-        deficit = _deficit(pad, p)
-        if deficit <= 0.0:
-            _refuse(NO_INFLATION, pad, p)
-        height = free_height(p * (pad.radius / pad.stiffness), deficit)
-        height, sphere, volume = _free_cap(pad.radius, height, height > 0.0)
-        return Inflated(height, sphere, volume, 'ok')
-    rows = p.ravel()
-    free = np.empty((3, rows.size))
-    code = np.zeros(rows.size, dtype=np.int8)
-    for start in range(0, rows.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        free[:, part], code[part] = _inflate_rows(pad, rows[part])
-    height, sphere, volume = free.reshape(3, *p.shape)
-    return Inflated(height, sphere, volume, words(code.reshape(p.shape)))
+        solved = inflate_rubber(pad, np.ravel(p))
+    else:
+        solved = _inflate_caps(pad, np.ravel(p))
+    return Inflated(*_told(solved, np.shape(p), lambda: f'pressure = {p:g} Pa on {pad}'))
 
 
 def press(
@@ -189,10 +164,9 @@ def press(
         ``pressure pi radius²``.
     force : float or array
         Normal force on this one pad, N, from 0. Broadcasts with the pressure.
-    adhesion : {'matlab', 'text', 'none'}
-        Sign of the adhesion term: attractive (default, as in the thesis' program), repulsive (as
-        in the thesis' text), or no adhesion. The membrane has no adhesion: it meets the floor at a
-        tangent.
+    adhesion : {'matlab', 'none'}
+        Adhesion that attracts, as in the thesis' program (default), or none. The membrane has
+        none: it meets the floor at a tangent.
     model : {'thesis', 'membrane'}
         The spherical dome of thesis 3.44-3.61, or the exact membrane of the same energy
         (:mod:`ros_pad.contact.membrane`). A pad of a material is an exact membrane in both cases
@@ -213,8 +187,7 @@ def press(
         ``out_of_range`` (pressure at which the free dome is outside the material's range).
     InvalidInput
         When a value is negative or not finite, shapes do not broadcast, ``adhesion`` or ``model``
-        is unknown, ``adhesion_energy`` is above 0.01 ``stiffness``, or a force is above 0 on a pad
-        with an edge, whose pressed shapes are not known.
+        is unknown, or ``adhesion_energy`` is above 0.01 ``stiffness``.
 
     Notes
     -----
@@ -235,38 +208,55 @@ def press(
     ['ok', 'flattened']
     """
     instance('pad', pad, Pad)
-    if model != 'thesis' or pad.material is not None:
-        choice('model', model, MODELS)
-        choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
+    choice('model', model, MODELS)
+    choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
+    p, load = quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N')
+    p, load = broadcast('pressure and force', p, load)
+    rows = pad, np.ravel(p), np.ravel(load)
+    if pad.material is not None:
+        from ros_pad.contact.hyperelastic import press_rubber
+
+        lengths, code, most = press_rubber(*rows)
+    elif model == 'membrane':
         from ros_pad.contact.membrane import press_membrane
 
-        return press_membrane(pad, pressure, force)
-    a = signed_adhesion(pad, adhesion)
-    p, load = quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N')
-    if isinstance(p, float) and isinstance(load, float):
-        return _press_one(pad, float(p), float(load), a)
-    p, load = broadcast('pressure and force', p, load)
-    rows, loads = p.ravel(), load.ravel()
-    pressed = np.empty((5, rows.size))
-    code = np.zeros(rows.size, dtype=np.int8)
-    for start in range(0, rows.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        code[part] = _press_rows(pad, rows[part], loads[part], a, pressed[:, part])
-    height, depth, contact, sphere, gap = pressed.reshape(5, *p.shape)
-    return Pressed(height, depth, contact, sphere, gap, words(code.reshape(p.shape)))
+        lengths, code, most = press_membrane(*rows)
+    else:
+        lengths, code, most = _press_caps(*rows, signed_adhesion(pad, adhesion))
+    return Pressed(
+        *_told(
+            (lengths * pad.radius, code, most),
+            p.shape,
+            lambda: f'pressure = {p:g} Pa, force = {load:g} N on {pad}',
+        )
+    )
+
+
+def _told(solved: Solved, shape: tuple[int, ...], given: Callable[[], str]) -> tuple[Any, ...]:
+    """Return values and status; for a scalar floats, or raise `NoEquilibrium` with the reason."""
+    values, code, most = solved
+    if shape:
+        return *values.reshape(-1, *shape), STATUS[code].reshape(shape)
+    status = int(code[0])
+    if status in _WHY:
+        why = _WHY[status].format(most[status])
+        if status == FLATTENED and most[status] <= 0.0:
+            why = 'where adhesion alone holds the pad flat, more pressure is needed'
+        raise NoEquilibrium(f'{given()}: {why}', str(STATUS[status]))
+    return *values[:, 0].tolist(), str(STATUS[status])
 
 
 # --- the free dome -------------------------------------------------------------------------------
 
 
-def free_height(tension: Floats, deficit: Floats) -> Floats:
+def free_height(tension: Array, deficit: Array) -> Array:
     """Return height over radius of the free dome, to rounding error.
 
     Parameters
     ----------
-    tension : float or array
+    tension : array
         ``P = p r/k``, from 0 to 6.
-    deficit : float or array
+    deficit : array
         ``6 - P``, given separately because ``6 - tension`` loses digits near 6.
 
     Notes
@@ -274,58 +264,47 @@ def free_height(tension: Floats, deficit: Floats) -> Floats:
     With ``w = tan(t/2)`` the pressure is rational, ``P = 4 w (1 + 5 w²)/(1 + w²)²``, and the
     height is ``2 w/(1 - w²)``, without trigonometric functions.
     """
-    w = _FREE_SEED[0] * tension + _FREE_SEED[1]
-    for coefficient in _FREE_SEED[2:]:
-        w = w * tension + coefficient
-    w = w * tension
-    for _ in range(2):  # errors after 0, 1 and 2 steps: 4e-4, 1e-7, rounding
+    w = tension / 6.0
+    for _ in range(6):
         square = w * w
-        sum_ = 1.0 + square
-        pull = tension * sum_
-        w = w - (w * (4.0 + 20.0 * square) - pull * sum_) / (4.0 + 60.0 * square - 4.0 * w * pull)
-    tall = tension > 5.0
-    if isinstance(tall, bool):
-        return _tall_height(w, deficit) if tall else 2.0 * w / ((1.0 - w) * (1.0 + w))
-    height = 2.0 * w / ((1.0 - w) * (1.0 + w))
-    if tall.any():
-        height[tall] = _tall_height(w[tall], deficit[tall])
-    return height
-
-
-def _tall_height(w: Floats, deficit: Floats) -> Floats:
-    """Return the height near the bursting pressure, computed from ``v = 1 - w`` and ``6 - P``."""
+        pull = tension * (1.0 + square)
+        misfit = w * (4.0 + 20.0 * square) - pull * (1.0 + square)
+        w = w - misfit / (4.0 + 60.0 * square - 4.0 * w * pull)
+    # Near the bursting pressure the digits are in v = 1 - w.
     v = 1.0 - w
     for _ in range(2):
         square = 2.0 + v * (v - 2.0)
         residual = v * (16.0 + v * (-12.0 + v * (-4.0 + 6.0 * v))) - deficit * square * square
         slope = 16.0 + v * (-24.0 + v * (-12.0 + 24.0 * v))
         v = v - residual / (slope - 4.0 * deficit * square * (v - 1.0))
-    return 2.0 * (1.0 - v) / (v * (2.0 - v))
+    tall = 2.0 * (1.0 - v) / (v * (2.0 - v))
+    return np.where(tension > 5.0, tall, 2.0 * w / ((1.0 - w) * (1.0 + w)))
 
 
-def _free_cap(r: float, height: Floats, inflated: bool) -> tuple[Floats, Floats, Floats]:
-    """Return height, m, sphere radius, m, and volume, m³, of a free dome."""
-    sphere = 0.5 * r * (height + 1.0 / height) if inflated else math.inf
-    return r * height, sphere, math.pi / 6.0 * r * r * r * height * (3.0 + height * height)
+def deficit(pad: Pad, pressure: Array) -> Array:
+    """Return ``6 - P``."""
+    return (BURST * pad.stiffness / pad.radius - pressure) * (pad.radius / pad.stiffness)
 
 
-def _inflate_rows(pad: Pad, p: Array) -> tuple[tuple[Array, ...], Codes]:
-    deficit = _deficit(pad, p)
-    code = np.zeros(p.size, dtype=np.int8)
-    burst = deficit <= 0.0
-    if burst.any():
-        code[burst] = NO_INFLATION
-        p, deficit = np.where(burst, np.nan, p), np.where(burst, np.nan, deficit)
-    with np.errstate(divide='ignore', over='ignore'):  # a flat pad has an infinite radius
-        cap = _free_cap(pad.radius, free_height(p * (pad.radius / pad.stiffness), deficit), True)
-    return cap, code
-
-
-def _deficit(pad: Pad, p: Floats) -> Floats:
-    return (BURST * pad.stiffness / pad.radius - p) * (pad.radius / pad.stiffness)
+@np.errstate(divide='ignore', over='ignore')  # a flat pad has an infinite radius
+def _inflate_caps(pad: Pad, p: Array) -> Solved:
+    """Return height, m, sphere radius, m, and volume, m³."""
+    r, left = pad.radius, deficit(pad, p)
+    code = np.where(left <= 0.0, NO_INFLATION, OK).astype(np.int8)
+    x = free_height(np.where(code, np.nan, p * (r / pad.stiffness)), left)
+    volume = math.pi / 6.0 * r**3 * x * (3.0 + x * x)
+    most = {NO_INFLATION: BURST * pad.stiffness / r}
+    return np.stack([r * x, 0.5 * r * (x + 1.0 / x), volume]), code, most
 
 
 # --- the pressed dome ----------------------------------------------------------------------------
+
+
+def signed_adhesion(pad: Pad, adhesion: str) -> float:
+    """Return the relative adhesion ``a`` of a pad; raise `InvalidInput` above 0.01."""
+    most = LARGEST_ADHESION * pad.stiffness
+    number('adhesion_energy', pad.adhesion_energy, 'J/m²', high=most)
+    return ADHESION_SIGNS[adhesion] * pad.adhesion_energy / pad.stiffness
 
 
 def largest_tension(a: float) -> float:
@@ -334,11 +313,11 @@ def largest_tension(a: float) -> float:
     Above P = 3.4263 - 4.1 a (91.368 kPa for the large pad without adhesion) the curve of force
     over height is S-shaped; the returned bound is slightly lower.
     """
-    return 3.426 - 4.5 * max(a, 0.0)
+    return 3.426 - 4.5 * a
 
 
 def flattening_force(tension: Floats, a: float) -> Floats:
-    """Return the force ``f`` at which the contact reaches the rim, for attraction ``a >= 0``.
+    """Return the force ``f`` at which the contact reaches the rim.
 
     At this force height x equals depth, and 3.53 and 3.58 reduce to
     ``P x³ - (2 - a) x² + a = 0`` with ``f = P (1 + x²) - 2x``. To first order
@@ -354,9 +333,71 @@ def flattening_force(tension: Floats, a: float) -> Floats:
     return tension * (1.0 + x * x) - 2.0 * x
 
 
-def _balance(
-    x: Floats, tension: Floats, f: Floats, a: float, sqrt: Callable[[Floats], Floats]
-) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+# Only domes lower than an atom overflow or underflow; these fail the certificate.
+@np.errstate(divide='ignore', invalid='ignore', over='ignore')
+def _press_caps(pad: Pad, p: Array, load: Array, a: float) -> Solved:
+    """Return height, depth, contact radius, sphere radius and gap over the radius."""
+    unit, area = pad.stiffness / pad.radius, math.pi * pad.stiffness * pad.radius
+    tension, f = p * (pad.radius / pad.stiffness), load / area
+    flat = flattening_force(tension, a)
+    # Domes lower than an atom would overflow: they count as flat.
+    code = np.where(np.maximum(f, 1e-300) >= flat, FLATTENED, OK).astype(np.int8)
+    code[tension > largest_tension(a)] = FOLD_ZONE
+    left = deficit(pad, p)
+    code[left <= 0.0] = NO_INFLATION
+    if a == 0.0:
+        code[(code == OK) & (f == 0.0)] = NO_CONTACT
+    most = {FOLD_ZONE: largest_tension(a) * unit, NO_INFLATION: BURST * unit}
+    most[FLATTENED] = float(flat[0]) * area
+    lengths = np.full((5, p.size), np.nan)
+    free = code == NO_CONTACT
+    x = free_height(tension[free], left[free])
+    lengths[:, free] = x, 0.0 * x, 0.0 * x, 0.5 * (x + 1.0 / x), x
+    rows = code == OK
+    tension, f = tension[rows], f[rows]
+    x = _heights(tension, f, a)
+    code[rows] = np.where(np.isnan(x), FLATTENED, OK)
+    *_, rho, spread, depth = _balance(x, tension, f, a)
+    # gap = (1 - b²)/(1/c2 - depth), without cancellation where the dome is nearly flat.
+    gap = ((tension - f) - 2.0 * a * rho) / tension / (1.0 / x - depth)
+    lengths[:, rows] = x, depth, np.sqrt(spread), rho, gap
+    return lengths, code, most
+
+
+def _heights(tension: Array, f: Array, a: float) -> Array:
+    """Return the heights in equilibrium; NaN where no root passes the certificate.
+
+    Newton's method inside a bracket. A trial height is too small where the residual is positive
+    and the certificate holds; elsewhere, also where no sphere of this height has this contact, it
+    is too large. So the bracket closes on the physical root only: between the unphysical roots
+    near flattening the certificate fails.
+    """
+    found, active = np.full_like(tension, np.nan), np.arange(tension.size)
+    low, high = (tension - f) / 8.0, 0.6 * tension
+    x, last = np.minimum(0.45 * (tension - f), high), high
+    for _ in range(200):
+        residual, slope, certificate, _, spread, depth = _balance(x, tension, f, a)
+        newton = x - residual / slope
+        # The step is so short that the next one would be a rounding error, and that the
+        # certificate cannot change its sign over the step.
+        settled = (abs(newton - x) <= 1e-7 * x) & (slope < 0.0) & (certificate > 1e-5)
+        settled &= (spread <= 1.0 + 1e-9) & (depth <= x * (1.0 + 1e-6))
+        found[active[settled]] = newton[settled]
+        small = (certificate > 0.0) & (residual > 0.0)
+        low, high = np.where(small, x, low), np.where(small, high, x)
+        # Take Newton's step if it stays inside and is at most half of the last; else bisect ln x.
+        good = (slope < 0.0) & (low <= newton) & (newton <= high)
+        good &= abs(newton - x) <= 0.5 * last
+        new: Array = np.where(good, newton, np.sqrt(low * high))
+        go = ~settled & (high - low > 2e-16 * high)
+        if not go.any():
+            break
+        active, last = active[go], abs(new - x)[go]
+        x, low, high, tension, f = (each[go] for each in (new, low, high, tension, f))
+    return found
+
+
+def _balance(x: Array, tension: Array, f: Array, a: float) -> tuple[Array, ...]:
     """Evaluate the equilibrium at a trial height x.
 
     Terms of order P are subtracted once, as ``P - f``, so that the residual keeps its digits near
@@ -364,26 +405,28 @@ def _balance(
 
     Returns
     -------
-    residual : float or array
+    residual : array
         Residual of 3.58. At the equilibrium it changes from positive to negative.
-    slope : float or array
+    slope : array
         Derivative of the residual over the height.
-    certificate : float or array
+    certificate : array
         Positive where the depth at this height is continuous with the free dome.
-    spread : float or array
+    rho : array
+        Radius of the sphere.
+    spread : array
         Squared contact radius (3.53).
-    depth : float or array
+    depth : array
         Depth that the floor cuts off (3.48).
     """
     inverse = 1.0 / x
     rho = 0.5 * (x + inverse)
     rho_slope = 0.5 - 0.5 * inverse * inverse
     spread = (f + 2.0 * a * rho) / tension
-    wall = sqrt(rho * rho - spread)
+    wall = np.sqrt(rho * rho - spread)
     depth = spread / (rho + wall)
     depth_slope = rho_slope * (a / tension - depth) / wall
     lift = x + depth
-    sigma = sqrt(1.0 + (x - depth) * lift)
+    sigma = np.sqrt(1.0 + (x - depth) * lift)
     pull = 3.0 * sigma - 2.0
     stretch = 3.0 * lift / sigma
     residual = 0.5 * ((tension - f) + tension * (x * x + depth * depth)) + a * rho - lift * pull
@@ -394,241 +437,4 @@ def _balance(
         - stretch * (x - depth * depth_slope)
     )
     certificate = tension * (wall - depth) + pull - depth * stretch
-    return residual, slope, certificate, spread, depth
-
-
-def _settled(
-    x: Floats, step: Floats, slope: Floats, certificate: Floats, spread: Floats, depth: Floats
-) -> Floats:
-    """Return whether a Newton step from x ends at the physical root, to rounding error.
-
-    The step is so short that the next one would be a rounding error, and that the certificate
-    cannot change its sign over the step.
-    """
-    return (
-        (abs(step) <= 1e-7 * x)
-        & (slope < 0.0)
-        & (certificate > 1e-5)
-        & (spread <= 1.0 + 1e-9)
-        & (depth <= x * (1.0 + 1e-6))
-    )
-
-
-def _seed(tension: Floats, f: Floats) -> Floats:
-    """Return the start value of the height."""
-    share = f / tension
-    height = 0.0
-    for row in _PRESSED_SEED:
-        inner = row[0] * share + row[1]
-        for coefficient in row[2:]:
-            inner = inner * share + coefficient
-        height = height * tension + inner
-    return height * (tension - f)
-
-
-def _height_of_one(tension: float, f: float, a: float) -> float:
-    """Return the height in equilibrium; NaN where no root passes the certificate."""
-    x = _seed(tension, f)
-    try:
-        for _ in range(4):  # nearly all converge in three
-            residual, slope, certificate, spread, depth = _balance(x, tension, f, a, math.sqrt)
-            step = -residual / slope
-            if _settled(x, step, slope, certificate, spread, depth):
-                return x + step
-            x += step
-    except (ValueError, ZeroDivisionError):
-        pass  # no sphere of this height has this contact
-    return _bracketed_height(tension, f, a)
-
-
-def _bracketed_height(tension: float, f: float, a: float) -> float:
-    """Return the height in equilibrium; NaN where no root passes the certificate.
-
-    Newton's method inside a bracket. A trial height is too small where the residual is positive
-    and the certificate holds; elsewhere it is too large. So the bracket closes on the physical
-    root only: between the unphysical roots near flattening the certificate fails.
-    """
-    low, high = (tension - f) / (8.0 if a >= 0.0 else 16.0), 0.6 * tension
-    x = min(max(low, _seed(tension, f)), high)
-    last = high
-    for _ in range(200):
-        small, newton = False, math.nan
-        try:
-            residual, slope, certificate, spread, depth = _balance(x, tension, f, a, math.sqrt)
-            # With repulsion ('text') there is a second, smaller root where the residual rises.
-            small = certificate > 0.0 and (
-                residual > 0.0 or (a < 0.0 and slope > 0.0 and x * x < -a)
-            )
-            if slope < 0.0:
-                newton = x - residual / slope
-                if _settled(x, newton - x, slope, certificate, spread, depth):
-                    return newton
-        except (ValueError, ZeroDivisionError):
-            pass  # no sphere of this height has this contact: too large
-        low, high = (x, high) if small else (low, x)
-        # Take Newton's step if it stays inside and is at most half of the last; else bisect ln x.
-        if not (low <= newton <= high and abs(newton - x) <= 0.5 * last):
-            newton = math.sqrt(low * high)
-        last = abs(newton - x)
-        x = newton
-        if high - low <= 2e-16 * high:
-            break
-    return math.nan
-
-
-def _heights_of_rows(tension: Array, f: Array, a: float) -> Array:
-    """Return the heights in equilibrium; NaN where no root passes the certificate.
-
-    Nine of ten rows converge in three steps; only the others take further steps.
-    """
-    height, active = _seed(tension, f), np.arange(tension.size)
-    x, p, load = height, tension, f
-    for steps in (3, 1, 1, 1):
-        for _ in range(steps):
-            before = x
-            residual, slope, *rest = _balance(x, p, load, a, np.sqrt)
-            step = -residual / slope
-            x = x + step
-        settled = _settled(before, step, slope, *rest)
-        height[active] = x
-        left = np.flatnonzero(~settled)
-        if not left.size:
-            return height
-        active, x, p, load = active[left], x[left], p[left], load[left]
-    for row in active.tolist():
-        height[row] = _bracketed_height(float(tension[row]), float(f[row]), a)
-    return height
-
-
-def _flattens(tension: Floats, f: Floats, a: float) -> Floats:
-    """Return where the force extends the contact to the rim."""
-    if a <= 0.0:
-        return f >= tension
-    # The limit is between P - 1.25 sqrt(2a) and P: most forces are below this range.
-    near = f > tension - 1.25 * math.sqrt(2.0 * a)
-    if isinstance(near, bool):
-        return near and f >= flattening_force(tension, a)
-    if near.any():
-        near[near] = f[near] >= flattening_force(tension[near], a)
-    return near
-
-
-def _hovers(x: Floats, f: Floats, a: float) -> Floats:
-    """Return where the repulsion of the floor carries the whole force, so that nothing touches.
-
-    If this holds for the free dome of height x, it holds for every lower (more curved) dome.
-    """
-    return f <= -a * (x + 1.0 / x)
-
-
-def _shape(
-    x: Floats, tension: Floats, f: Floats, a: float, sqrt: Callable[[Floats], Floats]
-) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return height, depth, contact radius, sphere radius and gap at the height x."""
-    rho = 0.5 * (x + 1.0 / x)
-    spread = (f + 2.0 * a * rho) / tension
-    depth = spread / (rho + sqrt(rho * rho - spread))
-    # gap = (1 - b²)/(1/c2 - depth), without cancellation where the dome is nearly flat.
-    unspread = ((tension - f) - 2.0 * a * rho) / tension
-    return x, depth, sqrt(spread), rho, unspread / (1.0 / x - depth)
-
-
-def _press_one(pad: Pad, p: float, load: float, a: float) -> Pressed:
-    """Return one pressed dome; raise `NoEquilibrium` where there is none."""
-    r = pad.radius
-    tension, f = p * (r / pad.stiffness), load / (math.pi * pad.stiffness * r)
-    deficit = _deficit(pad, p)
-    if deficit <= 0.0:
-        _refuse(NO_INFLATION, pad, p, load, a)
-    if tension > largest_tension(a):
-        _refuse(FOLD_ZONE, pad, p, load, a)
-    if _flattens(tension, f, a):
-        _refuse(FLATTENED, pad, p, load, a)
-    free = free_height(tension, deficit) if a <= 0.0 else math.nan
-    x = free if _hovers(free, f, a) else _height_of_one(tension, f, a)
-    if math.isnan(x):  # only with repulsion ('text'): beyond the fold that ends the branch
-        _refuse(FLATTENED, pad, p, load, a)
-    if _hovers(x, f, a):
-        return Pressed(r * free, 0.0, 0.0, r * 0.5 * (free + 1.0 / free), r * free, 'no_contact')
-    height, depth, contact, rho, gap = _shape(x, tension, f, a, math.sqrt)
-    return Pressed(r * height, r * depth, r * contact, r * rho, r * gap, 'ok')
-
-
-# Only domes lower than an atom overflow or underflow; these fail the certificate.
-@np.errstate(divide='ignore', invalid='ignore', over='ignore')
-def _press_rows(pad: Pad, p: Array, load: Array, a: float, lengths: Array) -> Codes:
-    """Write the five lengths of each row into ``lengths``; return the status codes."""
-    r = pad.radius
-    tension, f = p * (r / pad.stiffness), load / (math.pi * pad.stiffness * r)
-    code = np.zeros(p.size, dtype=np.int8)
-    flat = _flattens(tension, f, a)
-    if flat.any():
-        code[flat] = FLATTENED
-    if tension.max() > largest_tension(a):
-        code[tension > largest_tension(a)] = FOLD_ZONE
-        code[_deficit(pad, p) <= 0.0] = NO_INFLATION
-    free = free_height(tension, BURST - tension) if a <= 0.0 else tension
-    if a <= 0.0:
-        code[(code == OK) & _hovers(free, f, a)] = NO_CONTACT
-    rows: Any = slice(None)
-    if code.any():
-        lengths.fill(np.nan)
-        rows = code == OK
-    tension, f = tension[rows], f[rows]
-    x = _heights_of_rows(tension, f, a)
-    # No certified root, only with repulsion ('text'): beyond the fold that ends the branch.
-    code[rows] = np.isnan(x) * np.int8(FLATTENED)
-    for row, length in zip(lengths, _shape(x, tension, f, a, np.sqrt), strict=True):
-        row[rows] = r * length
-    if a <= 0.0:
-        code[rows] |= _hovers(x, f, a) * np.int8(NO_CONTACT)
-        apart = code == NO_CONTACT
-        x = free[apart]
-        for row, length in zip(lengths, (x, 0.0, 0.0, 0.5 * (x + 1.0 / x), x), strict=True):
-            row[apart] = r * length
-    return code
-
-
-def signed_adhesion(pad: Pad, adhesion: str) -> float:
-    """Return the relative adhesion ``a`` of a pad; raise `InvalidInput` above 0.01."""
-    if adhesion not in ADHESION_SIGNS:
-        choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
-    a = ADHESION_SIGNS[adhesion] * pad.adhesion_energy / pad.stiffness
-    if abs(a) > LARGEST_ADHESION:
-        most = LARGEST_ADHESION * pad.stiffness
-        raise InvalidInput(
-            f'adhesion_energy = {pad.adhesion_energy:g} J/m² is not allowed here: from 0 to'
-            f' {most:g} J/m² ({LARGEST_ADHESION:g} of the stiffness) is needed'
-        )
-    return a
-
-
-def _refuse(code: int, pad: Pad, p: float, load: float | None = None, a: float = 0.0) -> NoReturn:
-    """Raise `NoEquilibrium` with the status of a code, and what pressure or force is needed."""
-    unit = pad.stiffness / pad.radius
-    if code == NO_INFLATION:
-        why = (
-            f'the dome would grow without limit: a pressure below {BURST * unit:.6g} Pa is needed'
-        )
-    elif code == FOLD_ZONE:
-        most = largest_tension(a) * unit
-        why = f'the shape depends on the history of the load: at most {most:.6g} Pa is allowed'
-    elif p == 0.0:
-        why = 'a pad without pressure is flat, so the contact covers it: more pressure is needed'
-    else:
-        most = flattening_force(p / unit, max(a, 0.0)) * math.pi * pad.stiffness * pad.radius
-        if most <= 0.0:
-            why = 'adhesion alone holds the pad flat: more pressure is needed'
-            why += ' (in Pa: 75 kPa is 75e3)' if p < 1e3 else ''
-        else:
-            why = f'the contact would cover the whole pad: a force below {most:.6g} N is needed'
-            why += " (with adhesion='text' an even smaller force)" if a < 0.0 else ''
-    given = f'pressure = {p:g} Pa' + ('' if load is None else f', force = {load:g} N')
-    raise NoEquilibrium(f'{given} on {pad}: {why}', str(STATUS[code]))
-
-
-def words(code: Codes) -> npt.NDArray[np.str_]:
-    """Return the status words for an array of codes."""
-    if not code.any():
-        return np.full(code.shape, 'ok', dtype=STATUS.dtype)
-    return STATUS[code]
+    return residual, slope, certificate, rho, spread, depth

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput
 
 CONFIDENCE = 0.95
 # A constant is identified if its interval is within this factor of its value, and if every change
@@ -83,14 +82,18 @@ class Residual:
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted constants."""
+    """Fitted constants: values, half-widths of 95 % intervals, points, and sum of squares.
+
+    ``half_widths`` are of the logarithms of the values if ``logarithmic``; ``sensitivity`` has the
+    derivatives of the residuals (rows) over the constants.
+    """
 
     values: Array
-    half_widths: Array  # of the 95 % intervals; for logarithms of the values if ``logarithmic``
+    half_widths: Array
     logarithmic: bool
     points: int
     cost: float
-    sensitivity: Array  # derivatives of the residuals (rows) over the constants
+    sensitivity: Array
 
     def constant(self, name: str, unit: str, note: str, index: int = 0) -> Constant:
         """Return one of the constants with its interval."""
@@ -118,13 +121,12 @@ def fit_positive(
     measured: Array,
     start: Sequence[float],
     least: Sequence[float],
-    most: Sequence[float] | None = None,
+    most: Sequence[float],
 ) -> Fit:
     """Fit positive constants within bounds, minimising relative errors."""
     from scipy.optimize import least_squares
 
-    low = np.log(least) + 1e-9
-    high = np.full(len(low), np.inf) if most is None else np.log(most)
+    low, high = np.log(least) + 1e-9, np.log(most)
     first = np.clip(np.log(start), low + 1e-3, high - 1e-3)
 
     def errors(logarithms: Array) -> Array:
@@ -156,21 +158,10 @@ def _half_widths(jacobian: Array, residuals: Array) -> Array:
     spare = points - constants
     if spare < 1:
         return np.full(constants, np.nan)
-    variance = float(residuals @ residuals) / spare
-    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
-    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, spare)
-    return np.asarray(factor * np.sqrt(np.diag(covariance)))
+    covariance = residuals @ residuals / spare * np.linalg.pinv(jacobian.T @ jacobian)
+    return np.asarray(student.ppf(0.5 + 0.5 * CONFIDENCE, spare) * np.sqrt(np.diag(covariance)))
 
 
 def kept_constant(name: str, unit: str, value: float, note: str) -> Constant:
     """Return a constant that was not fitted."""
     return Constant(name, unit, value, math.nan, math.nan, 0, False, note)
-
-
-def above_zero(source: str, name: str, values: Array) -> None:
-    """Raise `InvalidInput` where a measured value is not above 0."""
-    if (values <= 0.0).any():
-        raise InvalidInput(
-            f'{source}: {name} = {values[values <= 0.0][0]:g} is not allowed: a fit needs values'
-            ' above 0'
-        )

@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 
-from ros_pad.contact.pad import Pad
 from ros_pad.contact.resistance import FOOT_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
@@ -34,7 +33,7 @@ def foot_text(
     comments : mapping of str to str
         What the comment behind a constant has after its unit, by name of the constant.
     """
-    pad, limit = foot.pad, foot.pad.measured_limit
+    pad, limit, material = foot.pad, foot.pad.measured_limit, foot.pad.material
 
     def entry(name: str, value: float, unit: str, indent: str = '') -> str:
         # PyYAML reads 1e-05 as text: a number needs a decimal point.
@@ -42,9 +41,8 @@ def foot_text(
         text = text if '.' in text else text.replace('e', '.0e') if 'e' in text else f'{text}.0'
         return f'{f"{indent}{name}: {text}":35} # {unit}'
 
-    def known(name: str, unit: str, value: float, indent: str = '', other: str = '') -> str:
-        comment = comments.get(other or name, 'of the start foot')
-        return entry(name, value, f'{unit}, {comment}', indent)
+    def comment(name: str) -> str:
+        return comments.get(name, 'of the start foot')
 
     lines = [
         *(f'# {line}' for line in head),
@@ -54,24 +52,35 @@ def foot_text(
         'pad:',
         entry('radius', pad.radius, 'm', '  '),
     ]
-    if pad.material is None:
-        if pad.thickness is not None:
-            lines.append(entry('thickness', pad.thickness, 'm', '  '))
+    if material is not None:
+        if not material.name:
+            raise InvalidInput(
+                f'the material {material} has no name: a foot file needs one that was loaded from'
+                ' a file (Material.load)'
+            )
+        lines.append(f'  material: {json.dumps(material.name, ensure_ascii=False)}')
+    if pad.thickness is not None:
+        lines.append(entry('thickness', pad.thickness, f'm, {comment("thickness")}', '  '))
+    if material is None:
         lines += [
-            known('stiffness', 'N/m', pad.stiffness, '  '),
+            entry('stiffness', pad.stiffness, f'N/m, {comment("stiffness")}', '  '),
             entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
         ]
     else:
-        lines += _material_lines(pad, comments, entry)
+        lines.append(f'  factor: # on the stresses of the material, {comment("factor")}')
+        values = (material.factor, *(material.factor_range or ()))
+        for name, value in zip(('value', 'low', 'high'), values, strict=True):
+            lines.append(entry(name, value, '(factor)', '    '))
     if limit is not None:
         lines += [
             '  measured_limit: # of one pad',
-            known('force', 'N', limit.force, '    ', 'force_limit'),
+            entry('force', limit.force, f'N, {comment("force_limit")}', '    '),
             entry('pressure', limit.pressure, 'Pa gauge', '    '),
-            known('slope', 'N/Pa', limit.slope, '    ', 'force_limit_slope'),
+            entry('slope', limit.slope, f'N/Pa, {comment("force_limit_slope")}', '    '),
         ]
     lines += ['', f'pads: {foot.pads}', entry('sole_radius', foot.sole_radius, 'm')]
-    lines += [known(name, UNITS[name], getattr(foot, name)) for name in FITTED]
+    for name in FITTED:
+        lines.append(entry(name, getattr(foot, name), f'{UNITS[name]}, {comment(name)}'))
     lines += [
         entry('shear_stiffness', foot.shear_stiffness, 'N/m of the whole foot'),
         entry('chamber_volume', foot.chamber_volume, 'm3 of air without the domes'),
@@ -80,23 +89,3 @@ def foot_text(
         f'force_limit: {foot.limit}',
     ]
     return '\n'.join(lines) + '\n'
-
-
-def _material_lines(
-    pad: Pad, comments: Mapping[str, str], entry: Callable[..., str]
-) -> Iterator[str]:
-    """Yield the lines of a foot file for material, thickness and factor of a pad."""
-    material = pad.material
-    assert material is not None and material.factor_range is not None
-    if not material.name:
-        raise InvalidInput(
-            f'the material {material} has no name: a foot file needs one that was loaded from a'
-            ' file (Material.load)'
-        )
-    yield f'  material: {json.dumps(material.name, ensure_ascii=False)}'
-    yield entry('thickness', pad.thickness, f'm, {comments.get("thickness", "as given")}', '  ')
-    yield f'  factor: # on the stresses of the material, {comments.get("factor", "as given")}'
-    for name, value in zip(
-        ('value', 'low', 'high'), (material.factor, *material.factor_range), strict=True
-    ):
-        yield entry(name, value, '(factor)', '    ')

@@ -32,6 +32,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ros_pad.configuration import quantity
 from ros_pad.contact.dome import (
     FLATTENED,
     NO_CONTACT,
@@ -40,19 +41,16 @@ from ros_pad.contact.dome import (
     OUT_OF_RANGE,
     STATUS,
     Codes,
-    Inflated,
-    words,
+    Solved,
 )
 from ros_pad.contact.material import tensions
 from ros_pad.contact.membrane import cap_through
-from ros_pad.contact.pad import Array, Floats, Pad
-from ros_pad.contact.thickness import HIGHEST, thickened
-from ros_pad.errors import InvalidInput, NoEquilibrium
+from ros_pad.contact.pad import Array, Pad
+from ros_pad.contact.roots import rising_root
+from ros_pad.errors import InvalidInput
 
 Law = tuple[str, tuple[float, ...]]
 
-# Rows of a batch computed at a time, so that temporary arrays fit the processor's cache.
-_CHUNK = 4096
 # States integrated together: with more, BLAS would start threads for each step.
 _TOGETHER = 1000
 # Most evaluations of the equations in one integration; usual are 2,000.
@@ -71,96 +69,54 @@ _FREE, _STRAINS, _LINES = 64, 48, 48
 _LOW, _SPAN = 0.02, (3e-3, 0.9999)
 # Rows and columns of the table of pressed domes: x, and s.
 _ROWS, _CONTACTS = 512, 512
-# Least ``F/(p π r²)`` at which the angle at the rim is looked up: it differs from that of the free
-# dome by less than rounding.
-_LEAST = 1e-18
-# With an edge: largest strain of the apex, states that are integrated, and places between them.
-_HIGH, _STATES, _PLACES = 2.2, 97, 4001
 # Places along a line between which its spline over s is made.
 _FINE = 800
 
 
-def inflate_rubber(pad: Pad, pressure: Floats) -> Inflated:
-    """Compute the free dome of a pad of a material, as :func:`ros_pad.contact.inflate` does.
+def inflate_rubber(pad: Pad, pressure: Array) -> Solved:
+    """Compute free domes, as :func:`ros_pad.contact.inflate` with one-dimensional pressures, Pa.
 
-    ``sphere_radius`` is that of the cap through rim and apex; the dome itself is no sphere.
+    The radius of the sphere is that of the cap through rim and apex; the dome itself is no sphere.
     """
     domes, unit = _of(pad)
-    rows = np.ravel(pressure)
-    code = _past_end(pad, rows)
-    if np.ndim(pressure) == 0 and code[0] != OK:
-        why = refusal(pad)[int(code[0])]
-        raise NoEquilibrium(f'pressure = {pressure:g} Pa on {pad}: {why}', str(STATUS[code[0]]))
-    inside = np.where(code == OK, rows, np.nan) if code.any() else rows
-    height, volume = np.empty((2, rows.size))
-    for start in range(0, rows.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        height[part], volume[part] = domes.free(inside[part] / unit)
-    with np.errstate(divide='ignore'):  # a flat pad has an infinite radius
-        sphere = 0.5 * pad.radius * (height + 1.0 / height)
-    height, sphere, volume = (
-        each.reshape(np.shape(pressure))
-        for each in (pad.radius * height, sphere, pad.radius**3 * volume)
-    )
-    if np.ndim(pressure) == 0:
-        return Inflated(float(height), float(sphere), float(volume), 'ok')
-    return Inflated(height, sphere, volume, words(code.reshape(np.shape(pressure))))
+    code, most = _past_end(pad, pressure)
+    height, volume = domes.free(np.where(code == OK, pressure, np.nan) / unit)
+    r = pad.radius
+    return np.stack([r * height, r * _sphere(height), r**3 * volume]), code, most
 
 
-def press_rubber(pad: Pad, pressure: Array, force: Array) -> tuple[Array, Codes]:
+def press_rubber(pad: Pad, pressure: Array, force: Array) -> Solved:
     """Return the lengths of pressed domes over the radius as rows, and the status codes.
 
     As :func:`ros_pad.contact.press` with one-dimensional pressures, Pa, and forces, N.
     """
     domes, unit = _of(pad)
-    if isinstance(domes, ThickDomes) and force.any():
-        raise InvalidInput(
-            f'force = {force.max():g} N on {pad} is not allowed: the correction for thickness is'
-            ' known for free domes only; 0 N, or a pad without edge, is needed'
-        )
     whole = pressure * (math.pi * pad.radius**2)
+    past, most = _past_end(pad, pressure)
     code = np.where(force > 0.0, OK, NO_CONTACT).astype(np.int8)
     code[force >= whole] = FLATTENED
-    past = _past_end(pad, pressure)
     code[past != OK] = past[past != OK]
     lengths = np.full((5, code.size), np.nan)
-    free = np.flatnonzero(code == NO_CONTACT)
-    if free.size:
+    free, rows = code == NO_CONTACT, code == OK
+    if free.any():
         height, _ = domes.free(pressure[free] / unit)
-        none = np.zeros_like(height)
-        lengths[:, free] = height, none, none, 0.5 * (height + 1.0 / height), height
-    rows = np.flatnonzero(code == OK)
-    for start in range(0, rows.size, _CHUNK):
-        part = rows[start : start + _CHUNK]
-        p, f, most = pressure[part], force[part], whole[part]
-        share, rest = f / most, (most - f) / most
-        assert isinstance(domes, Domes)
-        lengths[:, part] = cap_through(domes.gap(p / unit, share, rest), share, rest)
-    return lengths, code
+        lengths[:, free] = height, 0.0 * height, 0.0 * height, _sphere(height), height
+    if rows.any():
+        share, rest = force[rows] / whole[rows], (whole - force)[rows] / whole[rows]
+        gap = domes.gap(pressure[rows] / unit, share, rest)
+        lengths[:, rows] = cap_through(gap, share, rest)
+    return lengths, code, most | {FLATTENED: float(whole[0])}
 
 
-def rim_angle(pad: Pad, pressure: Array, force: Array) -> Array:
-    """Return the angle of the wall at the rim, rad, as :func:`press_rubber` takes its input.
-
-    Pressures are up to the end of the pad's model; 0 where the dome is flattened.
-    """
-    domes, unit = _of(pad)
-    assert isinstance(domes, Domes)
-    whole = pressure * (math.pi * pad.radius**2)
-    least = _LEAST * whole
-    angle = np.zeros_like(pressure)
-    for rows in np.split(np.arange(pressure.size), range(_CHUNK, pressure.size, _CHUNK)):
-        rows = rows[force[rows] < whole[rows]]
-        p, f, most = pressure[rows], np.maximum(force, least)[rows], whole[rows]
-        angle[rows] = domes.rim(p / unit, f / most)
-    return angle
+def _sphere(height: Array) -> Array:
+    """Return the radius of the sphere of a cap, infinite for a flat pad."""
+    with np.errstate(divide='ignore'):
+        return 0.5 * (height + 1.0 / height)
 
 
 def pressure_end(pad: Pad) -> tuple[float, str]:
     """Return the largest pressure of a pad of a material, Pa, and the status above it."""
     domes, unit = _of(pad)
-    if isinstance(domes, ThickDomes):
-        return domes.end * unit, domes.status
     known = pad.material.range_end  # type: ignore[union-attr]
     end = domes.pressure_at(known)
     balloons = domes.balloons and end == domes.end
@@ -182,57 +138,28 @@ def pressure_for_height(pad: Pad, height: Array) -> Array:
     InvalidInput
         When a height is above the largest one.
     """
-    end, status = pressure_end(pad)
-    highest = highest_dome(pad)
-    if (height > highest).any():
-        why = (
-            'there it balloons'
-            if status == 'no_inflation'
-            else f'there its range ends, a uniaxial stretch of {pad.material.uniaxial_end:.4g}'  # type: ignore[union-attr]
-        )
-        raise InvalidInput(
-            f'height = {height.max():g} m of a free dome is not allowed on {pad}: at most'
-            f' {highest:.6g} m, at {end:.6g} Pa, is allowed; {why}'
-        )
-    low, high = np.zeros_like(height), np.full_like(height, end)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        short = inflate_rubber(pad, middle).height < height
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return np.asarray(0.5 * (low + high))
+    quantity('height', height, 'm', high=highest_dome(pad))
+    end = np.full_like(height, pressure_end(pad)[0])
+
+    def excess(root: Array) -> Array:
+        return _height(pad, np.minimum(root**3, end)) - height
+
+    return np.minimum(rising_root(excess, 0.0 * end, np.cbrt(end)) ** 3, end)
 
 
 def highest_dome(pad: Pad) -> float:
     """Return the height of the highest free dome of a pad of a material, m."""
-    return float(inflate_rubber(pad, pressure_end(pad)[0]).height)
+    return float(_height(pad, np.array([pressure_end(pad)[0]]))[0])
 
 
-def refusal(pad: Pad) -> dict[int, str]:
-    """Return why a pad of a material is refused, by status code."""
-    end = pressure_end(pad)[0]
-    known = f'a uniaxial stretch of {pad.material.uniaxial_end:.4g}'  # type: ignore[union-attr]
-    if pad.edge is not None:
-        known += f', or rise above {HIGHEST[pad.edge]:g} radii, the highest in the correction'
-    return {
-        NO_INFLATION: (
-            f'it would balloon: the pressure has its maximum at {end:.6g} Pa, and at most that is'
-            ' allowed'
-        ),
-        OUT_OF_RANGE: (
-            f'the dome would stretch the material beyond its range, {known}: at most'
-            f' {end:.6g} Pa is allowed'
-        ),
-    }
+def _height(pad: Pad, pressure: Array) -> Array:
+    return np.asarray(inflate_rubber(pad, pressure)[0][0])
 
 
-def _of(pad: Pad) -> tuple[Domes | ThickDomes, float]:
+def _of(pad: Pad) -> tuple[Domes, float]:
     """Return the domes of a pad's law, prepared once, and the unit ``μ h/r`` of its pressure."""
-    material, unit = pad.material, pad.stiffness / pad.radius
-    assert material is not None and pad.thickness is not None
-    if pad.edge is not None:
-        ratio = pad.thickness / pad.radius
-        return _thick(material.unit_law, material.range_end, ratio, pad.edge), unit
-    return _prepared(material.unit_law, material.stable_end), unit
+    assert pad.material is not None
+    return _prepared(pad.material.unit_law, pad.material.stable_end), pad.stiffness / pad.radius
 
 
 @functools.lru_cache(maxsize=64)
@@ -240,14 +167,10 @@ def _prepared(law: Law, most: float) -> Domes:
     return Domes(law, most)
 
 
-@functools.lru_cache(maxsize=64)
-def _thick(law: Law, most: float, ratio: float, edge: str) -> ThickDomes:
-    return ThickDomes(law, most, ratio, edge)
-
-
-def _past_end(pad: Pad, pressure: Array) -> Codes:
+def _past_end(pad: Pad, pressure: Array) -> tuple[Codes, dict[int, float]]:
     end, status = pressure_end(pad)
-    return (pressure > end) * np.int8(STATUS.tolist().index(status))
+    code = STATUS.tolist().index(status)
+    return (pressure > end) * np.int8(code), {code: end}
 
 
 class Shapes(NamedTuple):
@@ -263,8 +186,6 @@ class Shapes(NamedTuple):
         Distance from pad base to floor: the height of a free dome.
     volume : array
         Volume under the membrane.
-    rim : array
-        Angle of the wall at the rim, rad.
     """
 
     pressure: Array
@@ -272,7 +193,6 @@ class Shapes(NamedTuple):
     rest: Array
     gap: Array
     volume: Array
-    rim: Array
 
 
 def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) -> Shapes:
@@ -328,8 +248,7 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
         speed = (angle + start) * (across / strain)
         return np.concatenate([speed, *(speed * d for d in rates(angle, run, along, across))])
 
-    zero = np.zeros_like(strain)
-    state = np.concatenate([zero, zero, strain, strain, zero, zero])
+    state = np.outer([0.0, 0.0, 1.0, 1.0, 0.0, 0.0], strain).ravel()
     root = np.sqrt(strain)
     scale = tolerance * np.concatenate([root, root, strain, strain, strain, strain**2])
     options: dict[str, Any] = {'method': 'DOP853', 'rtol': tolerance, 'atol': scale}
@@ -346,7 +265,7 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
         )
 
     state = solve_ivp(arrive, (0.0, 1.0), state, t_eval=[1.0], **options).y[:, -1]
-    angle, run, _, _, height, volume = state.reshape(6, -1)
+    _, run, _, _, height, volume = state.reshape(6, -1)
     rim = disc + run
     return Shapes(
         rim,
@@ -354,7 +273,6 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
         (run - strain * disc) / rim,
         height / rim,
         math.pi * volume / rim**3,
-        angle,
     )
 
 
@@ -421,26 +339,11 @@ class Domes:
         share, rest : array
             ``F/(p π r²)`` and 1 less that, both above 0.
         """
-        angle = self._at(self._pressed[1], pressure, share)
-        return rest / (1.0 + np.sqrt(share)) * np.tan(0.5 * angle)
-
-    def rim(self, pressure: Array, share: Array) -> Array:
-        """Return the angle of the wall at the rim, rad, of pressed domes."""
-        return self._at(self._rims, pressure, share)
-
-    def _at(self, table: Array, pressure: Array, share: Array) -> Array:
-        """Return the value of a table at P and ``F/(p π r²)``."""
-        pushes, _, starts, first, step = self._pressed
-        contact = np.sqrt(share)
-        place = (np.sqrt(contact) - first) / step
-        row = np.rint(self._coordinate(pressure) * ((_ROWS - 1) / self._last)).astype(np.intp)
-        column = np.rint(place).astype(np.intp)
-        start = starts[row * _CONTACTS + np.clip(column, 0, _CONTACTS - 1)]
-        low = np.clip(start.astype(np.intp) - 1, 0, _ROWS - 4)
-        left = np.clip(place.astype(np.intp) - 1, 0, _CONTACTS - 4)
-        corner, weights = low * _CONTACTS + left, _weights(place - left)
-        x = _root(_across(pushes, corner, weights), np.cbrt(pressure), start - low)
-        return _sum(_across(table, corner, weights), _weights(x))
+        push, angle = self._pressed
+        place, aim = np.sqrt(np.sqrt(share)), np.cbrt(pressure)
+        none = np.zeros_like(aim)
+        x = rising_root(lambda x: push(x, place) - aim, none, none + self._last)
+        return rest / (1.0 + np.sqrt(share)) * np.tan(0.5 * angle(x, place))
 
     def _coordinate(self, pressure: Array) -> Array:
         """Return x, in which domes are analytic both where P is small and at a maximum of P."""
@@ -454,44 +357,17 @@ class Domes:
         self._last = float(self._coordinate(np.array(self.end)))
         x = np.linspace(0.0, self._last, 2049)[1:]
         aim = np.cbrt(self._turn * x**3 * (2.0 - x**3)) ** 2
-        low, high = np.zeros_like(x), np.full_like(x, self._most)
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            under = middle * self._push(middle) < aim
-            low, high = np.where(under, middle, low), np.where(under, high, middle)
+        high = rising_root(lambda e: e * self._push(e) - aim, 0.0 * x, 0.0 * x + self._most)
         e = np.where(x < 0.5, aim / self._push(high), high)
         height, volume = (_series(each / np.sqrt(strain), span)(e) for each in free[3:5])
         root = np.sqrt(e) / x
         return CubicSpline(x, np.stack([root * height, root * volume, root * root], axis=1))
 
     @functools.cached_property
-    def _pressed(self) -> tuple[Array, Array, Array, float, float]:
-        """Tables of ``P^(1/3)`` and ψ over x and s, start values, first s and step of s."""
-        _, states, _, kept = self._states
-        angle = 2.0 * np.arctan2(states.gap, states.rest)
-        push, angle = self._tables(np.cbrt(states.pressure), angle)
-        x = np.linspace(0.0, self._last, _ROWS)
-        even = np.cbrt(self._turn * x**3 * (2.0 - x**3))
-        starts = np.array(
-            [np.interp(even, np.maximum.accumulate(each), np.arange(_ROWS)) for each in push.T]
-        ).T
-        return (
-            push.ravel(),
-            angle.ravel(),
-            starts.ravel(),
-            float(kept[0]),
-            float(kept[1] - kept[0]),
-        )
+    def _pressed(self) -> tuple[Any, Any]:
+        """Splines of ``P^(1/3)`` and ψ over x and s."""
+        from scipy.interpolate import CubicSpline, RectBivariateSpline
 
-    @functools.cached_property
-    def _rims(self) -> Array:
-        """Table of the angle at the rim over x and s."""
-        (table,) = self._tables(self._states[1].rim)
-        return table.ravel()
-
-    @functools.cached_property
-    def _states(self) -> tuple[Array, Shapes, Array, Array]:
-        """Given x, states over x and lines, s over finer x and lines, and the s of the tables."""
         lines, given = _nodes(*_SPAN, _LINES), _nodes(_LOW, 1.0, _STRAINS) * self._last
         states = self._on_lines(given, self._reach(lines), lines, _TOLERANCE)
         place = _finer(np.sqrt(states.contact))
@@ -501,18 +377,13 @@ class Domes:
                 ' are not known: at large stretch their shape depends on the history of the load;'
                 ' a smaller largest_stretch may help if it is above 5'
             )
-        kept = np.linspace(place[:, 0].max(), place[:, -1].min(), _CONTACTS)
-        return given, states, place, kept
-
-    def _tables(self, *fields: Array) -> Array:
-        """Return tables over x and s of fields that are in proportion to x where it is small."""
-        from scipy.interpolate import CubicSpline
-
-        given, _, place, kept = self._states
-        finer = np.stack([_finer(each / given[:, None]) for each in fields], axis=-1)
-        rows = [CubicSpline(*pair)(kept) for pair in zip(place, finer, strict=True)]
-        x = np.linspace(0.0, self._last, _ROWS)
-        return np.moveaxis(x[:, None, None] * np.array(rows), -1, 0)
+        x, kept = np.linspace(0.0, self._last, _ROWS), np.linspace(0.0, 1.0, _CONTACTS)
+        found = []
+        for field in (np.cbrt(states.pressure), 2.0 * np.arctan2(states.gap, states.rest)):
+            rows = zip(place, _finer(field / given[:, None]), strict=True)  # in proportion to x
+            table = np.array([CubicSpline(*pair)(kept) for pair in rows])
+            found.append(RectBivariateSpline(x, kept, x[:, None] * table).ev)
+        return found[0], found[1]
 
     def _reach(self, lines: Array) -> Array:
         """Return the factors on the line of largest x with which P is just above ``end``."""
@@ -537,43 +408,6 @@ class Domes:
         disc = (self._turn * x**3 * (2.0 - x**3))[:, None] * reach**1.5 * lines**2
         states = shapes(self._law, strain.ravel(), disc.ravel(), tolerance)
         return Shapes(*(each.reshape(strain.shape) for each in states))
-
-
-class ThickDomes:
-    """Free domes of one law, thickness and edge (:mod:`ros_pad.contact.thickness`).
-
-    Attributes
-    ----------
-    end : float
-        Largest ``P = p r/(μ h)``.
-    status : str
-        That of pressures above it: ``no_inflation`` at a maximum of P.
-    """
-
-    def __init__(self, law: Law, most: float, ratio: float, edge: str) -> None:
-        from scipy.interpolate import CubicSpline
-
-        root = np.linspace(0.0, math.sqrt(min(most, _HIGH)), _STATES)[1:]
-        found = shapes(law, root**2, np.full_like(root, _POINT))
-        # P^(1/3), height and volume begin in proportion to the root of the strain.
-        parts = np.cbrt(found.pressure), found.gap, found.volume
-        fine = np.linspace(0.0, root[-1], _PLACES)
-        push, height, volume = CubicSpline(
-            np.append(0.0, root), np.vstack([np.zeros(3), np.stack(parts, axis=1)])
-        )(fine).T
-        membrane = push**3, height, volume
-        states = np.array(thickened(edge, ratio, law[1], fine**2, membrane))
-        beyond = states[1] > HIGHEST[edge]
-        end = int(np.argmax(beyond)) if beyond.any() else fine.size
-        falls = np.diff(states[0, :end]) <= 0.0
-        self.status = str(STATUS[NO_INFLATION if falls.any() else OUT_OF_RANGE])
-        self._states = states[:, : int(np.argmax(falls)) + 1 if falls.any() else end]
-        self.end = float(self._states[0, -1])
-
-    def free(self, pressure: Array) -> tuple[Array, Array]:
-        """Return height of the outer face and volume of free domes, for P from 0 to ``end``."""
-        known, height, volume = self._states
-        return np.interp(pressure, known, height), np.interp(pressure, known, volume)
 
 
 def _nodes(low: float, high: float, count: int) -> Array:
@@ -606,39 +440,3 @@ def _finer(values: Array) -> Array:
 
 def _series(values: Array, span: tuple[float, float]) -> Any:
     return np.polynomial.chebyshev.Chebyshev(_fit(values), span)
-
-
-def _weights(x: Array) -> tuple[Array, Array, Array, Array]:
-    """Return the weights of nodes 0 to 3 in the cubic interpolation at x."""
-    one, two, three = x - 1.0, x - 2.0, x - 3.0
-    near, far = x * one, two * three
-    return one * far / -6.0, x * far * 0.5, near * three * -0.5, near * two / 6.0
-
-
-def _sum(values: list[Array], weights: tuple[Array, ...]) -> Array:
-    total = values[0] * weights[0]
-    for value, weight in zip(values[1:], weights[1:], strict=True):
-        total += value * weight
-    return total
-
-
-def _across(table: Array, corner: Any, weights: tuple[Array, ...]) -> list[Array]:
-    """Return four rows of a table from a corner on, each interpolated over the columns."""
-    return [
-        _sum([table[corner + (row * _CONTACTS + k)] for k in range(4)], weights)
-        for row in range(4)
-    ]
-
-
-def _root(values: list[Array], aim: Array, x: Array) -> Array:
-    """Return where the cubic through values at 0, 1, 2, 3 reaches an aim, by Newton's method."""
-    zero, one, two, three = values
-    first = one - zero
-    second = 0.5 * (two - one - first)
-    third = (three - two - (two - one) - 2.0 * second) / 6.0
-    # Powers of x, from the differences.
-    c1, c2 = first - second + 2.0 * third, second - 3.0 * third
-    zero = zero - aim
-    for _ in range(6):
-        x = x - (zero + x * (c1 + x * (c2 + x * third))) / (c1 + x * (2.0 * c2 + 3.0 * x * third))
-    return x

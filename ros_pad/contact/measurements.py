@@ -52,10 +52,18 @@ COLUMNS = {
     'stance_time': 'time',
 }
 SURFACE = 'surface'
-_SHAPE = ('height', 'depth', 'contact_radius', 'gap')
 # ``height [mm]``, ``height (mm)``, ``height/mm`` or ``height_mm``; longer names are tried first.
-_NAMES = '|'.join(sorted(COLUMNS, key=len, reverse=True))
-_HEAD = re.compile(rf'(?P<name>{_NAMES})(?:\s*\[(.*)\]|\s*\((.*)\)|\s*/(.*)|_(.*))?')
+_HEAD = re.compile(rf'({"|".join(sorted(COLUMNS, key=len, reverse=True))})\s*[\[(/_]?(\w*)[\])]?')
+# Kinds of rows: columns that a row needs, and those by which its kind is recognised.
+_KINDS = {
+    'free': (('pressure', 'height'), ()),
+    'pressed': (('pressure', 'force'), ('force', 'depth', 'contact_radius', 'gap')),
+    'limit': (('pressure', 'force_limit'), ('force_limit',)),
+    'friction': (
+        ('pressure', 'load', 'tangential_force', SURFACE),
+        ('load', 'tangential_force', SURFACE, 'stance_time'),
+    ),
+}
 
 
 class FreeDomes(NamedTuple):
@@ -171,102 +179,75 @@ class Measurements:
         def columns(kind: str, names: tuple[str, ...]) -> list[Array]:
             return [column(kind, name) for name in names]
 
+        wet = column('friction', SURFACE) == 1.0
+        forces = {n: column('friction', n) for n in Friction._fields if n != 'wet'}
         return cls(
             source=source,
             free=FreeDomes(*columns('free', FreeDomes._fields)),
             pressed=PressedDomes(*columns('pressed', PressedDomes._fields)),
             force_limits=ForceLimits(*columns('limit', ForceLimits._fields)),
-            friction=Friction(
-                pressure=column('friction', 'pressure'),
-                load=column('friction', 'load'),
-                tangential_force=column('friction', 'tangential_force'),
-                wet=column('friction', SURFACE) == 1.0,
-                stance_time=column('friction', 'stance_time'),
-            ),
+            friction=Friction(**forces, wet=wet),
         )
-
-
-# Kinds of rows, and the columns by which a kind is recognised.
-_KINDS = {
-    'friction': ('load', 'tangential_force', SURFACE, 'stance_time'),
-    'limit': ('force_limit',),
-    'pressed': ('force', 'depth', 'contact_radius', 'gap'),
-    'free': ('height',),
-}
 
 
 def _header(where: str, cells: list[str]) -> list[tuple[str, float, float]]:
     """Return name, factor to SI and largest value of each column."""
     columns = []
-    for cell in cells:
-        head = cell.strip()
-        if head == SURFACE:
+    for cell in map(str.strip, cells):
+        if cell == SURFACE:
             columns.append((SURFACE, 1.0, 1.0))
             continue
-        if re.search(rf'[;\t]\s*({_NAMES}|{SURFACE})', head):
-            raise ConfigError(f'{where}: commas are needed between columns, unlike in {head!r}')
-        match = _HEAD.fullmatch(head)
+        match = _HEAD.fullmatch(cell.replace('\N{GREEK SMALL LETTER MU}', '\N{MICRO SIGN}'))
         if match is None:
-            known = ', '.join((*COLUMNS, SURFACE))
-            raise ConfigError(f'{where}: unknown column {head!r}; allowed are {known}')
-        name, *given = match.groups()
-        unit = next((text.strip() for text in given if text is not None), '')
-        unit = unit.replace('\N{GREEK SMALL LETTER MU}', '\N{MICRO SIGN}')
+            raise ConfigError(
+                f'{where}: unknown column {cell!r}; allowed, with commas between them, are'
+                f' {", ".join((*COLUMNS, SURFACE))}'
+            )
+        name, unit = match.groups()
         units = _UNITS[COLUMNS[name]]
         if unit not in units:
             raise ConfigError(
-                f'{where}: column {head!r} needs a unit, as in {name} [{next(iter(units))}]: '
+                f'{where}: column {cell!r} needs a unit, as in {name} [{next(iter(units))}]: '
                 f'one of {", ".join(units)}'
             )
         columns.append((name, units[unit], _LARGEST[COLUMNS[name]]))
     names = [name for name, _, _ in columns]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ConfigError(f'{where}: column {twice[0]} occurs twice')
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f'{where}: column {name} occurs twice')
     return columns
 
 
 def _row(where: str, header: list[tuple[str, float, float]], cells: list[str]) -> dict[str, float]:
     """Return the values of a line by column, in SI; ``surface`` is 0 for dry and 1 for wet."""
-    if len(cells) > len(header) and any(cell.strip() for cell in cells[len(header) :]):
-        raise ConfigError(
-            f'{where}: {len(cells)} values for {len(header)} columns: a row must not have more'
-            ' values than the header has columns'
-        )
+    if any(cell.strip() for cell in cells[len(header) :]):
+        raise ConfigError(f'{where}: {len(cells)} values for {len(header)} columns')
     row = {}
-    for (name, factor, largest), cell in zip(header, cells, strict=False):
-        value = cell.strip()
-        if not value:
+    for (name, factor, largest), cell in zip(header, map(str.strip, cells), strict=False):
+        if not cell:
             continue
-        if name == SURFACE:
-            if value not in ('dry', 'wet'):
-                raise ConfigError(
-                    f'{where}: surface = {value!r} is not allowed: dry or wet is needed'
-                )
-            row[name] = float(value == 'wet')
-            continue
+        allowed = f'a number from 0 to {largest / factor:g}, in the unit of the column,'
         try:
-            number = float(value) * factor
+            if name == SURFACE:
+                allowed = 'dry or wet'
+                row[name] = float(('dry', 'wet').index(cell))
+            else:
+                row[name] = float(cell) * factor
         except ValueError:
-            raise ConfigError(
-                f'{where}: {name} = {value!r} is not allowed: a number is needed'
-            ) from None
-        if not 0.0 <= number <= largest:
-            raise ConfigError(
-                f'{where}: {name} = {value} is not allowed: from 0 to {largest / factor:g}, in the'
-                ' unit of the column, is needed'
-            )
-        row[name] = number
+            row[name] = math.nan
+        if not 0.0 <= row[name] <= largest:
+            raise ConfigError(f'{where}: {name} = {cell} is not allowed: {allowed} is needed')
     return row
 
 
 def _kind(where: str, row: dict[str, float]) -> str:
     """Return the kind of a row; raise `ConfigError` where it mixes kinds or lacks a column."""
-    if row.get('force') == 0.0 and not row.keys() & {'depth', 'contact_radius', 'gap'}:
+    shapes = {'depth', 'contact_radius', 'gap'}
+    if row.get('force') == 0.0 and not row.keys() & shapes:
         del row['force']  # a free dome
-    kinds = [kind for kind, own in _KINDS.items() if row.keys() & set(own)]
-    if kinds == ['pressed', 'free']:  # pressed domes can have a height as well
-        kinds = ['pressed']
+    kinds = [kind for kind, (_, own) in _KINDS.items() if row.keys() & set(own)]
+    if 'height' in row and kinds != ['pressed']:  # pressed domes can have a height as well
+        kinds.append('free')
     if len(kinds) != 1:
         given = ', '.join(row) or 'nothing'
         raise ConfigError(
@@ -274,14 +255,8 @@ def _kind(where: str, row: dict[str, float]) -> str:
             ' and shape), a force limit (pressure, force_limit) or friction (pressure, load,'
             f' tangential_force, surface); this one has {given}'
         )
-    needed = {
-        'friction': ('pressure', 'load', 'tangential_force', SURFACE),
-        'limit': ('pressure', 'force_limit'),
-        'pressed': ('pressure', 'force'),
-        'free': ('pressure', 'height'),
-    }[kinds[0]]
-    missing = [name for name in needed if name not in row]
-    if not missing and kinds[0] == 'pressed' and not row.keys() & set(_SHAPE):
+    missing = [name for name in _KINDS[kinds[0]][0] if name not in row]
+    if not missing and kinds[0] == 'pressed' and not row.keys() & {'height', *shapes}:
         missing = ['height, depth, contact_radius or gap']
     if missing:
         raise ConfigError(f'{where}: a row with {", ".join(row)} also needs {missing[0]}')

@@ -44,7 +44,6 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import quantity
 from ros_pad.contact.dome import (
     BURST,
     FLATTENED,
@@ -52,126 +51,67 @@ from ros_pad.contact.dome import (
     NO_CONTACT,
     NO_INFLATION,
     OK,
-    STATUS,
-    Pressed,
+    Solved,
+    deficit,
     free_height,
-    words,
 )
-from ros_pad.contact.pad import Array, Pad, broadcast
-from ros_pad.errors import NoEquilibrium
+from ros_pad.contact.pad import Array, Pad
+from ros_pad.contact.roots import rising_root
 
 # Slightly below the cusp at P = 5.14267, b² = 0.71433, where the root cannot be resolved.
 LARGEST_PRESSURE = 5.14
 LARGEST_SHARE = 0.71
 
-_WHY = {
-    FLATTENED: (
-        'the contact would cover the whole pad: a force below pressure * pi * radius² is needed'
-    ),
-    FOLD_ZONE: (
-        'the shape depends on the history of the load: a pressure up to 5.14 stiffness/radius, or'
-        ' a force up to 0.71 * pressure * pi * radius², is needed'
-    ),
-    NO_INFLATION: (
-        'the dome would grow without limit: a pressure below 6 stiffness/radius is needed'
-    ),
-}
 
-
-def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> Pressed:
+# Only domes lower than an atom overflow: they fail the certificate.
+@np.errstate(divide='ignore', invalid='ignore', over='ignore')
+def press_membrane(pad: Pad, pressure: Array, force: Array) -> Solved:
     """Compute the exact membrane of a pad pressed on a floor, without adhesion.
 
     Parameters
     ----------
     pad : Pad
-        Size and material. Its ``adhesion_energy`` has no effect.
-    pressure : float or array
-        Gauge pressure, Pa, from 0 to below ``6 stiffness/radius``.
-    force : float or array
-        Normal force on this one pad, N, from 0 to ``pressure pi radius²``; above
-        ``5.14 stiffness/radius`` only to 0.71 of that. Broadcasts with the pressure.
+        Its radius and stiffness.
+    pressure, force : array
+        Gauge pressures, Pa, and normal forces, N, one-dimensional.
 
     Returns
     -------
-    Pressed
-        ``gap`` and ``contact_radius`` are those of the membrane. Its wall is not a sphere:
-        ``height``, ``depth`` and ``sphere_radius`` are those of the spherical cap through rim and
-        edge of contact, as the thesis derives them from measurements (section 3.2.1).
-
-    Raises
-    ------
-    NoEquilibrium
-        For scalar input, with status ``flattened`` (the contact would cover the pad),
-        ``fold_zone`` (both bounds in the module's docstring are exceeded) or ``no_inflation``.
-    InvalidInput
-        When a value is negative or not finite, or shapes do not broadcast.
+    tuple
+        Height, depth, contact radius, sphere radius and gap over the radius as rows; status codes;
+        and what is allowed at most, as in :mod:`ros_pad.contact.dome`. Gap and contact radius are
+        those of the membrane. Its wall is not a sphere: the others are those of the spherical cap
+        through rim and edge of contact, as the thesis derives them from measurements (section
+        3.2.1).
 
     Notes
     -----
     The shape depends on ``P = p r/k`` and ``F/(p pi r²)`` only; lengths scale with the radius. The
     relative error of the gap is 1e-12, plus the rounding of the input: 1e-16/(1 - F/(p pi r²))
     near flattening and 1e-15/(6 - P) near bursting.
-
-    Examples
-    --------
-    >>> from ros_pad.contact import LARGE_PAD
-    >>> round(press_membrane(LARGE_PAD, 75e3, 0.19).gap, 9)
-    0.000755475
     """
-    p, load = quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N')
-    p, load = broadcast('pressure and force', p, load)
-    r, k = pad.radius, pad.stiffness
-    rows, why = p.ravel(), _WHY
-    if pad.material is not None:
-        from ros_pad.contact.hyperelastic import press_rubber, refusal
-
-        lengths, code = press_rubber(pad, rows, load.ravel())
-        why = _WHY | refusal(pad)
-    else:
-        deficit = (BURST * k / r - rows) * (r / k)
-        lengths, code = _press(rows * (r / k), load.ravel() / (math.pi * k * r), deficit)
-    lengths *= r
-    if p.ndim == 0:
-        status = str(STATUS[code[0]])
-        if code[0] in why:
-            what = f'pressure = {p:g} Pa, force = {load:g} N on {pad}'
-            raise NoEquilibrium(f'{what}: {why[int(code[0])]}', status)
-        height, depth, contact, sphere, gap = lengths[:, 0].tolist()
-        return Pressed(height, depth, contact, sphere, gap, status)
-    height, depth, contact, sphere, gap = lengths.reshape(5, *p.shape)
-    return Pressed(height, depth, contact, sphere, gap, words(code.reshape(p.shape)))
-
-
-# Only domes lower than an atom overflow: they fail the certificate.
-@np.errstate(divide='ignore', invalid='ignore', over='ignore')
-def _press(pressure: Array, force: Array, deficit: Array) -> tuple[Array, npt.NDArray[np.int8]]:
-    """Return height, depth, contact radius, sphere radius and gap as rows, and the status codes.
-
-    Parameters
-    ----------
-    pressure, force : array
-        ``P = p r/k`` and ``f = F/(pi k r)``, one-dimensional.
-    deficit : array
-        ``6 - P``, given separately because ``6 - pressure`` loses digits near 6.
-    """
-    code = np.where(force > 0.0, OK, NO_CONTACT).astype(np.int8)
-    code[force >= pressure] = FLATTENED
-    code[(pressure > LARGEST_PRESSURE) & (force > LARGEST_SHARE * pressure)] = FOLD_ZONE
-    code[deficit <= 0.0] = NO_INFLATION
+    unit, area = pad.stiffness / pad.radius, math.pi * pad.stiffness * pad.radius
+    p, f = pressure * (pad.radius / pad.stiffness), force / area
+    left = deficit(pad, pressure)
+    code = np.where(f > 0.0, OK, NO_CONTACT).astype(np.int8)
+    code[np.maximum(f, 1e-300) >= p] = FLATTENED
+    code[(p > LARGEST_PRESSURE) & (f > LARGEST_SHARE * p)] = FOLD_ZONE
+    code[left <= 0.0] = NO_INFLATION
+    most = {FLATTENED: float(p[0]) * area, FOLD_ZONE: LARGEST_PRESSURE * unit}
     lengths = np.full((5, code.size), np.nan)
 
     free = code == NO_CONTACT
-    height = free_height(pressure[free], deficit[free])
+    height = free_height(p[free], left[free])
     lengths[:, free] = height, 0.0 * height, 0.0 * height, 0.5 * (height + 1.0 / height), height
 
     rows = np.flatnonzero(code == OK)
-    p, f = pressure[rows], force[rows]
+    p, f = p[rows], f[rows]
     share, rest = f / p, (p - f) / p
-    t, certain = _rim(p, share, rest, deficit[rows])
+    t, certain = _rim(p, share, rest, left[rows])
     code[rows[~certain]] = NO_INFLATION  # too close to P = 6 to resolve the balance
     gap = _wall(t, share, rest)[2]
     lengths[:, rows] = np.where(certain, cap_through(gap, share, rest), np.nan)
-    return lengths, code
+    return lengths, code, most | {NO_INFLATION: BURST * unit}
 
 
 def cap_through(gap: Array, share: Array, rest: Array) -> tuple[Array, ...]:
@@ -218,36 +158,19 @@ def _residual(t: Array, pressure: Array, share: Array, rest: Array) -> Array:
     return (1.5 * sigma - 1.0 - pressure * curve) * (t / (1.0 + t))
 
 
-def _rim(pressure: Array, share: Array, rest: Array, deficit: Array) -> tuple[Array, npt.NDArray]:
+def _rim(
+    pressure: Array, share: Array, rest: Array, left: Array
+) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Return ``t = tan(psi/2)`` at the rim, and whether the residual changes its sign there.
 
-    Regula falsi with the weights of Anderson and Björck. At the lower end of the bracket, t = 0,
-    the tension is too low. At the upper end it is too high: either ``sin psi = P (1 - b²)``, as
+    At the upper end of the bracket the tension is too high: either ``sin psi = P (1 - b²)``, as
     sigma > 1, or close to 180°, where Q is ``6 - 1/l``.
     """
     sine = np.minimum(pressure * rest, 1.0)
-    high = np.where(sine < 1.0, sine / (1.0 + np.sqrt(1.0 - sine * sine)), 8.0 / (rest * deficit))
+    high = np.where(sine < 1.0, sine / (1.0 + np.sqrt(1.0 - sine * sine)), 8.0 / (rest * left))
     high = high * (1.0 + 1e-9)  # stay above the root even where sigma rounds to 1
-    given = np.stack((pressure, share, rest))
-    rim, active = high.copy(), np.arange(high.size)
-    last, off_last = high, _residual(high, *given)
-    across, off_across = np.zeros_like(high), -0.25 * pressure * rest
-    for _ in range(100):  # about 12 steps are usual
-        t = last - off_last * ((last - across) / (off_last - off_across))
-        off = _residual(t, *given)
-        rim[active] = t
-        left = np.flatnonzero((np.abs(t - last) > 1e-14 * t) & (off != 0.0))
-        if not left.size:
-            break
-        active, given = active[left], given[:, left]
-        t, off, last, off_last = t[left], off[left], last[left], off_last[left]
-        changed = (off < 0.0) != (off_last < 0.0)
-        weight = 1.0 - off / off_last
-        weight[weight <= 0.0] = 0.5
-        across = np.where(changed, last, across[left])
-        off_across = np.where(changed, off_last, weight * off_across[left])
-        last, off_last = t, off
-    width = np.minimum(1e-10 + 4e-15 / deficit, 0.5)
-    below = _residual(rim * (1.0 - width), pressure, share, rest)
-    above = _residual(rim * (1.0 + width), pressure, share, rest)
+    given = pressure, share, rest
+    rim = rising_root(lambda t: _residual(t, *given), 1e-9 * high, high)
+    width = np.minimum(1e-10 + 4e-15 / left, 0.5)
+    below, above = _residual(rim * (1.0 - width), *given), _residual(rim * (1.0 + width), *given)
     return rim, (below < 0.0) & (above > 0.0)

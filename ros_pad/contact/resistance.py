@@ -20,8 +20,7 @@ from __future__ import annotations
 import functools
 import math
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -173,30 +172,19 @@ class Foot:
     ceiling: float
     limit: str = DEFAULT_CRITERION
     capillary_force: float = 0.0
-    _limit_table: tuple[float, ...] = field(init=False, repr=False, compare=False)
-    _limit_cell: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for each in FOOT_SETTINGS[1:]:
             above = each.name not in _MAY_BE_ZERO
             number(each.name, getattr(self, each.name), each.unit, above=above)
-        integer('pads', self.pads, 1)
-        if self.pads * math.pi * self.pad.radius**2 > self.sole_area:
-            raise InvalidInput(
-                f'pads = {self.pads} of radius {self.pad.radius:g} m do not fit on a sole with'
-                f' sole_radius = {self.sole_radius:g} m: the area of the sole allows at most'
-                f' {int((self.sole_radius / self.pad.radius) ** 2)}'
-            )
+        fit = int((self.sole_radius / self.pad.radius) ** 2)
+        integer('pads', self.pads, 1, fit, f'(at most {fit} fit on the sole)')
         choice('limit', self.limit, CRITERIA)
         check_criterion(self.pad, self.limit, 'force_limit')
-        # Every simulated step needs the limit: tabulate it once, in steps of about 0.5 kPa.
-        cells = math.ceil(self.ceiling / 500.0)
         try:
-            limits = _limits(self.pad, self.ceiling, cells, self.limit)
+            _ = self._limit_table, self._limit_cell
         except (NoEquilibrium, InvalidInput) as error:
             raise InvalidInput(f'ceiling = {self.ceiling:g} Pa is not allowed: {error}') from error
-        object.__setattr__(self, '_limit_table', tuple(self.pads * each for each in limits))
-        object.__setattr__(self, '_limit_cell', self.ceiling / cells)
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> Foot:
@@ -240,6 +228,17 @@ class Foot:
     def sole_area(self) -> float:
         """Area of the sole, m²."""
         return math.pi * self.sole_radius**2
+
+    @cached_property
+    def _limit_table(self) -> tuple[float, ...]:
+        """Force limits of all pads, N, in equal steps of about 0.5 kPa up to the ceiling."""
+        cells = math.ceil(self.ceiling / 500.0)
+        limits = _limits(self.pad, self.ceiling, cells, self.limit)
+        return tuple(self.pads * each for each in limits)
+
+    @cached_property
+    def _limit_cell(self) -> float:
+        return self.ceiling / (len(self._limit_table) - 1)
 
     def on_rough(self, roughness: float) -> Foot:
         """Return the foot with its constants on a rough floor.
@@ -319,8 +318,7 @@ class Foot:
         if pressure <= 0.0:
             return 0.0
         place = pressure / self._limit_cell
-        index = int(place)
-        table = self._limit_table
+        index, table = int(place), self._limit_table
         if index >= len(table) - 1:
             limit = table[-1]
         else:
@@ -381,36 +379,22 @@ def _limits(pad: Pad, ceiling: float, cells: int, criterion: str) -> tuple[float
 
 
 def _pad(table: Table) -> Pad:
-    line = _measured_limit(table)
-    make: Callable[..., Pad] = Pad
-    if 'material' in table:
-        for name in ('stiffness', 'adhesion_energy'):
-            if name in table:
-                raise ConfigError(
-                    f'{table.origin}: {name} is not allowed beside material: its law and the'
-                    ' thickness give the stiffness, and such pads have no adhesion'
-                )
-        values = table.values(RUBBER_SETTINGS)
-        material, factor = Material.load(values.pop('material')), factor_in(table)
-    else:
-        material, factor = None, {}
-        values = table.values(PAD_SETTINGS)
-        if 'thickness' in table:
-            values['thickness'] = table.value(RUBBER_SETTINGS[-1])
+    line, rubber = None, 'material' in table
+    if 'measured_limit' in table:
+        with table.table('measured_limit') as part:
+            line = MeasuredLimit(**part.values(LIMIT_SETTINGS))
+    values = table.values(RUBBER_SETTINGS if rubber else PAD_SETTINGS)
     try:
-        if material is not None:
-            values['material'] = material.times(*factor.values()) if factor else material
-            make = Pad.of
-        return make(**values, measured_limit=line)
+        if not rubber:
+            if 'thickness' in table:
+                values['thickness'] = table.value(RUBBER_SETTINGS[-1])
+            return Pad(**values, measured_limit=line)
+        material, factor = Material.load(values.pop('material')), factor_in(table)
+        if factor:
+            material = material.times(*factor.values())
+        return Pad.of(material, **values, measured_limit=line)
     except InvalidInput as error:
         raise ConfigError(f'{table.origin}: {error}') from error
-
-
-def _measured_limit(pad_table: Table) -> MeasuredLimit | None:
-    if 'measured_limit' not in pad_table:
-        return None
-    with pad_table.table('measured_limit') as table:
-        return MeasuredLimit(**table.values(LIMIT_SETTINGS))
 
 
 def tangential_resistance(

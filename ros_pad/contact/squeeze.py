@@ -7,8 +7,8 @@ Reynolds equation of a round film without inertia, both walls without slip,
 
     ∂h/∂t = 1/(12 η r) ∂/∂r (r h³ ∂p/∂r),    p = 0 at the rim,
 
-is solved with h = H(t) + κ r²/2 + w(r): height, curvature of the surface, and its deflection by
-the pressure, as a half-space or as a membrane. H follows from the load, or is prescribed.
+is solved with h = H(t) + κ r²/2 + w(r): height, which follows from the load, curvature of the
+surface, and its deflection by the pressure, as a half-space or as a membrane.
 
 Finite volumes on rings. Pressure is uniform on each, so deflections are closed forms. The flux
 between rings uses the mean 2 h₁² h₂²/(h₁ + h₂) of h³, which vanishes with either film, so films
@@ -282,8 +282,7 @@ def squeeze(
     surface: HalfSpace | Membrane,
     initial: float,
     time: ArrayLike,
-    load: float | None = None,
-    velocity: float | None = None,
+    load: float,
     viscosity: float = WATER_VISCOSITY,
     rise: float = 0.0,
     rings: int = 200,
@@ -302,11 +301,8 @@ def squeeze(
         Thinnest film at time 0, m, above 0. The film is that plus the surface's curvature.
     time : array
         Times, s, rising, from 0.
-    load : float or None
+    load : float
         Force on the surface, N, above 0.
-    velocity : float or None
-        In place of a load: constant speed of the surface's far side towards the plane, m/s;
-        negative to lift it (no cavitation).
     viscosity : float
         Dynamic viscosity, Pa s, above 0.
     rise : float
@@ -325,8 +321,8 @@ def squeeze(
     Raises
     ------
     InvalidInput
-        When a value is out of range, both or none of load and velocity are given, or the surface
-        is so stiff that it is rigid: use :func:`ros_pad.contact.film_thickness`.
+        When a value is out of range, or the surface is so stiff that it is rigid: use
+        :func:`ros_pad.contact.film_thickness`.
     NoSurface
         With status ``no_convergence``, when the time steps fail.
 
@@ -342,32 +338,21 @@ def squeeze(
     >>> f'{1e6 * rigid:.1f} micrometres'
     '3.4 micrometres'
     """
-    instance('surface', surface, HalfSpace, Membrane)
-    times = _checked(initial, time, load, velocity, viscosity, rings, tolerance)
-    if number('rise', rise, 's') > 0.0 and load is None:
-        raise InvalidInput(
-            f'rise = {rise:g} s is not allowed with a velocity: 0 s is needed, only loads rise'
-        )
-    return _solve(surface, initial, times, load, velocity, viscosity, rise, rings, tolerance)
-
-
-def _solve(
-    surface: HalfSpace | Membrane,
-    initial: float,
-    times: Array,
-    load: float | None,
-    velocity: float | None,
-    viscosity: float,
-    rise: float,
-    rings: int,
-    tolerance: float,
-) -> Squeezed:
     from scipy.integrate import solve_ivp
 
+    instance('surface', surface, HalfSpace, Membrane)
+    number('initial', initial, 'm', above=True)
+    number('viscosity', viscosity, 'Pa s', above=True)
+    number('load', load, 'N', above=True)
+    number('rise', rise, 's')
+    integer('rings', rings, 10, 2000)
+    number('tolerance', tolerance, '', 1e-10, 1e-2)
+    times = np.atleast_1d(quantity('time', time, 's'))
+    if times.ndim > 1 or not times.size or np.any(np.diff(times) <= 0.0) or times[-1] <= 0.0:
+        raise InvalidInput(f'time = {times} is not allowed: rising values from 0 s are needed')
     a, eta = surface.radius, viscosity
-    force = load or 1.5 * math.pi * eta * a**4 * abs(velocity or 0.0) / initial**3
     # Units: radius a, film `initial`, pressure p0, time η a²/(p0 h0²).
-    p0 = force / (math.pi * a**2)
+    p0 = load / (math.pi * a**2)
     unit = eta * a**2 / (p0 * initial**2)
     softness = surface.compliance * p0 / initial
     if softness < _STIFFEST:
@@ -379,10 +364,7 @@ def _solve(
     middles, area = 0.5 * (edges[1:] + edges[:-1]), math.pi * np.diff(edges**2)
     profile = 0.5 * surface.curvature * a**2 / initial * middles**2
     compliance = softness * surface.deflection(edges, middles)
-    if velocity is None:
-        pressure_of, slope = _loaded(compliance, area, profile, rise / unit)
-    else:
-        pressure_of, slope = _moved(compliance, profile, velocity * unit / initial)
+    pressure_of, slope = _loaded(compliance, area, profile, rise / unit)
     flow, jacobian = _flow(edges, middles, area, pressure_of, slope)
     start = np.append(1.0 + profile, 0.0)
     found = solve_ivp(
@@ -492,41 +474,10 @@ def dry_share(middle: float, critical_film: float, exponent: float = 2.0) -> flo
     return float(gamma(1.0 + power) * gammainc(power, deep ** (1.0 / power)) / deep)
 
 
-def _checked(
-    initial: float,
-    time: ArrayLike,
-    load: float | None,
-    velocity: float | None,
-    viscosity: float,
-    rings: int,
-    tolerance: float,
-) -> Array:
-    """Return the times; raise `InvalidInput` if anything is out of range."""
-    number('initial', initial, 'm', above=True)
-    number('viscosity', viscosity, 'Pa s', above=True)
-    integer('rings', rings, 10, 2000)
-    number('tolerance', tolerance, '', 1e-10, 1e-2)
-    times = np.atleast_1d(np.asarray(quantity('time', time, 's'), dtype=float))
-    if times.ndim > 1 or not times.size or np.any(np.diff(times) <= 0.0) or times[-1] <= 0.0:
-        raise InvalidInput(f'time = {times} is not allowed: rising values from 0 s are needed')
-    if (load is None) == (velocity is None):
-        given = 'none is' if load is None else 'both are'
-        raise InvalidInput(f'exactly one of load and velocity is needed, but {given} given')
-    if load is not None:
-        number('load', load, 'N', above=True)
-    elif velocity is not None:
-        number('velocity', velocity, 'm/s', -1e3, 1e3)
-        if velocity == 0.0:
-            raise InvalidInput('velocity = 0 m/s is not allowed: another number is needed')
-    return times
-
-
-def _edges(rings: int, surface: HalfSpace | Membrane, load: float | None) -> Array:
+def _edges(rings: int, surface: HalfSpace | Membrane, load: float) -> Array:
     """Return the edges of the rings, 0 to 1."""
     if surface.curvature == 0.0:
         rim, width = 1.0, _FLAT_RIM
-    elif load is None:
-        return np.linspace(0.0, 1.0, rings + 1)
     else:
         rim = surface.contact_radius(load) / surface.radius
         width = _CURVED_RIM * rim
@@ -560,12 +511,6 @@ def _loaded(
         return slope @ (film - profile) + (base if time >= rise else time / rise * base)
 
     return pressures, slope
-
-
-def _moved(compliance: Array, profile: Array, speed: float) -> tuple[Pressures, Array]:
-    """Return the same for a surface that approaches at a speed."""
-    slope = np.asarray(np.linalg.inv(compliance), dtype=np.float64)
-    return lambda time, film: slope @ (film - profile - 1.0 + speed * time), slope
 
 
 def _flow(

@@ -72,38 +72,25 @@ class _Changes:
 
     def __init__(self) -> None:
         self.commanded = 0.0  # time of the last change of the set-point
-        self._distance = 0.0  # whole pressure change of the fill or vent being timed; 0 for none
+        self.distance = 0.0  # whole pressure change of the fill or vent being timed; 0 for none
         self._filling = False
         self.fill, self.vent = RunningMedian(START), RunningMedian(START)
 
     def begin(self, time: float, aim: float, pressure: float) -> None:
         """Time the change from a pressure to a set-point if it is more than half of a fill."""
-        self.commanded = time
-        self._filling = aim > pressure
+        self.commanded, self._filling = time, aim > pressure
         distance = abs(aim - pressure)
-        self._distance = distance if distance > 0.5 * max(aim, pressure) else 0.0
+        self.distance = distance if distance > 0.5 * max(aim, pressure) else 0.0
 
-    def stop(self) -> None:
-        """Time the present change no longer."""
-        self._distance = 0.0
-
-    def end(self, time: float, tolerance: float) -> None:
-        """Learn from a change that has reached its set-point."""
-        if self._distance > 2.0 * tolerance:
-            self._learn(time - self.commanded)
-        self._distance = 0.0
-
-    def cut_short(self, time: float, left: float, tolerance: float) -> None:
-        """Estimate a fill or vent time from an aborted change, assumed to be exponential."""
-        if tolerance < left < 0.8 * self._distance:
-            self._learn(
-                (time - self.commanded)
-                * math.log(self._distance / tolerance)
-                / math.log(self._distance / left)
-            )
-
-    def _learn(self, duration: float) -> None:
-        (self.fill if self._filling else self.vent).add(duration)
+    def learn(self, time: float, left: float, tolerance: float) -> None:
+        """Learn from a change of which a pressure is left; it is assumed to be exponential."""
+        if left > tolerance and left < 0.8 * self.distance:
+            share = math.log(self.distance / tolerance) / math.log(self.distance / left)
+        elif left <= tolerance and self.distance > 2.0 * tolerance:
+            share = 1.0
+        else:
+            return
+        (self.fill if self._filling else self.vent).add((time - self.commanded) * share)
 
 
 class _Motion:
@@ -149,30 +136,18 @@ class _Repair:
 
     def __init__(self) -> None:
         self.side = 0  # kind of the fault: -1 pressure too low, 1 too high, 0 sensor faulty
-        self._lowest = self._highest = 0.0  # lowest and highest reading since the fault
-        self._right = math.inf  # time since which the pad has worked again
-
-    def restart(self) -> None:
-        """Wait for the pad to be right again."""
-        self._right = math.inf
-
-    def begin(self, pressure: float) -> None:
-        """Follow the readings from this one on."""
-        self._lowest = self._highest = pressure
-
-    def follow(self, pressure: float) -> None:
-        """Process a reading, Pa."""
-        self._lowest, self._highest = min(self._lowest, pressure), max(self._highest, pressure)
+        self.lowest = self.highest = 0.0  # lowest and highest reading since the fault
+        self.right = math.inf  # time since which the pad has worked again
 
     def done(self, time: float, aim: float, pressure: float, tolerance: float) -> bool:
         """Return whether a pad at its set-point has been right for long enough."""
         able = (
             aim == 0.0,
-            self._highest - pressure > tolerance,
-            aim > tolerance and pressure - self._lowest > tolerance,
+            self.highest - pressure > tolerance,
+            aim > tolerance and pressure - self.lowest > tolerance,
         )[self.side]
-        self._right = min(self._right, time) if able else math.inf
-        return time - self._right >= HEALED
+        self.right = min(self.right, time) if able else math.inf
+        return time - self.right >= HEALED
 
 
 class PadMonitor:
@@ -207,8 +182,6 @@ class PadMonitor:
     has been constant for 0.4 s. So the slowest fill that counts as moving is an exponential one
     with a time constant of 1.8 s (4 s to 90 %), or one at a constant rate of 6.7 kPa/s.
 
-    An update takes 1.2 µs, and 0.4 µs while the pad is at its set-point.
-
     Examples
     --------
     A pad that stays flat is faulty some time after the command to fill it:
@@ -230,7 +203,6 @@ class PadMonitor:
         self._setpoint = math.nan  # NaN: none
         self._time = self._read = -math.inf
         self._arrived = False  # whether the pad has reached the present set-point
-        self._rests = False  # whether it is sound and there, and was so at the last reading
         self._changes, self._motion, self._repair = _Changes(), _Motion(), _Repair()
 
     @property
@@ -270,23 +242,15 @@ class PadMonitor:
         aim = math.nan if setpoint is None else setpoint
         reading = math.nan if pressure is None else pressure
         before, self._time = self._time, time
-        steady = 0.0 <= time - before <= SILENT
-        if self._rests:
-            if steady and aim == self._setpoint and self._is_right(aim, reading):
-                self._read, self.pressure = time, reading
-                return
-            self._rests = False
-            self._motion.restart(self._read)
-        if not steady:
+        if not 0.0 <= time - before <= SILENT:
             before = self._read = time
             self._wait(time)
         last, self._setpoint = self._setpoint, aim
         if setpoint is None:
             self._wait(time)
-        elif math.isnan(last):
-            self._set_out(before, aim, self.pressure)
-        elif abs(aim - last) > self.tolerance:
-            self._changes.cut_short(before, abs(last - self.pressure), self.tolerance)
+        elif not abs(aim - last) <= self.tolerance:  # also the first one
+            if not math.isnan(last):
+                self._changes.learn(before, abs(last - self.pressure), self.tolerance)
             self._set_out(before, aim, self.pressure)
         if not math.isfinite(reading):
             silent = time - self._read
@@ -303,10 +267,6 @@ class PadMonitor:
                 self._set_out(time, aim, reading)
             self._judge(time, aim, last_read)
 
-    def _is_right(self, aim: float, pressure: float) -> bool:
-        over = pressure > self._ceiling + self.tolerance
-        return abs(pressure - aim) <= self.tolerance and not over
-
     def _set_out(self, time: float, aim: float, pressure: float) -> None:
         """Begin a pressure change."""
         self._arrived = False
@@ -315,37 +275,37 @@ class PadMonitor:
 
     def _wait(self, time: float) -> None:
         """Restart the comparison of readings with the set-point."""
-        self._changes.stop()
+        self._changes.distance, self._repair.right = 0.0, math.inf
         self._motion.restart(time)
-        self._repair.restart()
 
     def _judge(self, time: float, aim: float, last_read: float) -> None:
-        pressure, tolerance = self.pressure, self.tolerance
-        self._repair.follow(pressure)
-        if self._is_right(aim, pressure):
-            self._changes.end(time, tolerance)
-            self._motion.restart(time)
-            self._arrived = True
-            if self.fault and self._repair.done(time, aim, pressure, tolerance):
-                self.fault = None
-            self._rests = not self.fault
-            return
-        self._repair.restart()
+        pressure, tolerance, repair = self.pressure, self.tolerance, self._repair
+        repair.lowest = min(repair.lowest, pressure)
+        repair.highest = max(repair.highest, pressure)
         over = pressure > self._ceiling + tolerance
+        if abs(pressure - aim) <= tolerance and not over:
+            self._changes.learn(time, 0.0, tolerance)
+            self._changes.distance, self._arrived = 0.0, True
+            self._motion.restart(time)
+            if self.fault and repair.done(time, aim, pressure, tolerance):
+                self.fault = None
+            return
+        repair.right = math.inf
         if self._motion.stalls(time, abs(pressure - aim), tolerance, last_read, over):
             self._find_fault(time, aim, over)
 
     def _find_fault(self, time: float, aim: float, over: bool) -> None:
-        self._changes.stop()
+        self._changes.distance = 0.0
         pressure, repair = self.pressure, self._repair
         side = 1 if pressure > aim or over else -1
         if pressure < -self.tolerance:
             side = 0
-        repair.begin(pressure)
+        repair.lowest = repair.highest = pressure
         if self.fault and side == repair.side:
             return
         stuck = bool(self.fault) and side * repair.side < 0
         repair.side = side
+        late = time - self._changes.commanded
         if side == 0:
             self.fault = Kind.SENSOR(pressure)
         elif over:
@@ -355,8 +315,8 @@ class PadMonitor:
         elif self._arrived:
             self.fault = (Kind.RISES if side > 0 else Kind.SAGS)(pressure, aim)
         elif side > 0:
-            self.fault = Kind.NO_VENT(pressure, time - self._changes.commanded)
+            self.fault = Kind.NO_VENT(pressure, late)
         elif pressure < self.tolerance:
-            self.fault = Kind.NO_FILL(pressure, time - self._changes.commanded)
+            self.fault = Kind.NO_FILL(pressure, late)
         else:
             self.fault = Kind.LEAK(pressure, aim - pressure)

@@ -9,7 +9,7 @@ becomes flat, or keeps its morphology; the other feet are not affected.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,7 +23,6 @@ from ros_pad.control.monitor import PadMonitor, RunningMedian
 from ros_pad.control.policies import DOME, FLAT, Choice, LiftOff, Policy
 from ros_pad.control.pressure import dome_pressure
 from ros_pad.errors import InvalidInput, LimitError
-from ros_pad.estimation.load_gate import LIFT_OFF_SHARE, TOUCH_DOWN, LoadGate
 
 COMMAND_TIMEOUT = Setting(
     'command_timeout', 0.5, 'A pad is vented when it has received no set-point for this long.',
@@ -38,18 +37,51 @@ MARGIN = Setting(
 )  # fmt: skip
 
 LIFT_OFF = Setting(
-    'lift_off_share', LIFT_OFF_SHARE, 'Share of the expected load below which a foot has lifted'
+    'lift_off_share', 0.3, 'Share of the expected load below which a foot has lifted'
     ' off; it stands again at this share plus 0.3.', '', 0.01, 0.6,
 )  # fmt: skip
 
-FIRST_WAIT = 5
-"""Number of flat steps after a fault of the air before a dome is tried again."""
+FIRST_WAIT, LONGEST_WAIT = 5, 40
+"""Flat steps after a fault of the air before a dome is tried again; the number doubles with each
+failed try, up to the second one."""
 
-LONGEST_WAIT = 40
-"""Largest number of flat steps between two tries; the number doubles with each failed try."""
 
-FURTHEST_LEAD = 3
-"""Largest lead of a leg with a slow hose, steps."""
+TOUCH_DOWN = 0.3
+"""Additional share of the expected load from which on a foot stands again for the controller. So
+noise does not count as steps. Nor does the bounce of a landing foot, which touches the ground with
+up to 0.55 of its load (0.8 on rough ground) and has little load again until the other tripod lifts
+off."""
+
+
+class LoadGate:
+    """Decide from its load whether a foot stands, with hysteresis.
+
+    Parameters
+    ----------
+    expected_load : float
+        Normal force in stance, N, above 0.
+    share : float
+        Share of that load below which a standing foot has lifted off, above 0 up to 1.
+    hysteresis : float
+        Additional share of that load from which on the foot stands again, 0 or more.
+
+    Attributes
+    ----------
+    lift_off, touch_down : float
+        Loads at which the foot lifts off and touches down, N.
+    standing : bool
+        Whether the foot stands.
+    """
+
+    def __init__(self, expected_load: float, share: float, hysteresis: float = 0.0) -> None:
+        self.lift_off = share * expected_load
+        self.touch_down = (share + hysteresis) * expected_load
+        self.standing = False
+
+    def update(self, load: float) -> bool:
+        """Process a load, N; return whether the foot stands."""
+        self.standing = load >= (self.lift_off if self.standing else self.touch_down)
+        return self.standing
 
 
 @dataclass
@@ -88,25 +120,15 @@ class FootFault:
 
 @dataclass(slots=True)
 class _Ground:
-    """Load and positions of a foot in this stance and in the one before."""
+    """Load, positions and times of a foot in this stance and in the one before."""
 
     gate: LoadGate
     peak: float  # largest recent load, N, for which the pressure of domes is chosen
     largest: float = 0.0  # largest load of this stance, N
     stood: tuple[float, float] = (0.0, 0.0)  # last position in stance, m
     lifted: tuple[float, float] | None = None  # position at the last lift-off, m
-
-    def end_stance(self) -> None:
-        """Update the largest recent load, which decays over some tens of steps."""
-        self.peak = max(self.largest, self.peak + 0.1 * (self.largest - self.peak))
-        self.largest = 0.0
-
-    def next_position(self, position: Sequence[float]) -> tuple[float, float]:
-        """Return where a foot that lifts off will stand, m, if its steps are of equal length."""
-        x, y = position[0], position[1]
-        before_x, before_y = self.lifted or (x, y)
-        self.lifted = (x, y)
-        return 2.0 * x - before_x, 2.0 * y - before_y
+    lifted_at: float = math.nan  # time of that, s
+    swing: RunningMedian = field(default_factory=lambda: RunningMedian(math.inf))  # duration, s
 
 
 @dataclass(slots=True)
@@ -132,17 +154,6 @@ class _Air:
 
 
 @dataclass(slots=True)
-class _Timing:
-    """Times of events of a leg, and durations, s."""
-
-    now: float = math.nan  # last observation
-    updated: float = math.nan  # last estimate
-    lifted: float = math.nan  # last lift-off
-    swing: RunningMedian = field(default_factory=lambda: RunningMedian(math.inf))
-    stride: RunningMedian = field(default_factory=lambda: RunningMedian(math.inf))
-
-
-@dataclass(slots=True)
 class _LegState:
     """Memory of the controller about one leg."""
 
@@ -150,29 +161,22 @@ class _LegState:
     ground: _Ground
     air: _Air
     morphology: str
+    setpoint: float = 0.0
+    now: float = math.nan  # time of the last observation, s
+    updated: float = math.nan  # and of the last estimate
     timeout: Fault | None = None
     no_step: Fault | None = None
     sensors: Fault | None = None
     lasting: dict[int, FootFault] = field(default_factory=dict)  # by place in `present`
-    timing: _Timing = field(default_factory=_Timing)
     steps: float = math.inf  # steps since the morphology changed last
     probing: bool = False
     decided: int = 0  # number of this leg's last decision, counted over all legs
-    setpoint: float = 0.0
 
     @property
     def present(self) -> tuple[Fault | None, ...]:
         """Its faults of all sorts, each at its place; None for those that it does not have."""
         monitor = self.air.monitor
         return self.timeout, self.no_step, self.sensors, monitor.silence, monitor.fault
-
-    @property
-    def lead(self) -> int:
-        """Whole steps by which a fill takes longer than a swing, at most `FURTHEST_LEAD`."""
-        late = self.air.monitor.fill_time - self.timing.swing.value
-        if not late > 0.0:
-            return 0
-        return min(math.ceil(late / self.timing.stride.value), FURTHEST_LEAD)
 
 
 class MorphologyController:
@@ -260,11 +264,7 @@ class MorphologyController:
         command_timeout: float = COMMAND_TIMEOUT.default,
     ) -> None:
         instance('foot', foot, Foot)
-        if not callable(policy):
-            raise InvalidInput(
-                f'policy = {policy!r} is not allowed: a function is needed, such as policy_named'
-                ' returns'
-            )
+        instance('policy', policy, Callable)  # type: ignore[arg-type]
         number('expected_load', expected_load, 'N', above=True)
         first = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
         for leg in legs:
@@ -278,37 +278,27 @@ class MorphologyController:
                     f'fixed_pressure = {fixed_pressure:g} Pa is above the ceiling of'
                     f' {foot.ceiling:g} Pa of {foot.source}'
                 )
-        self._foot = foot
-        self.policy = policy
-        self.margin = margin
+        self._foot, self._fixed_pressure = foot, fixed_pressure
+        self.policy, self.margin = policy, margin
         self.command_timeout = COMMAND_TIMEOUT.accept(command_timeout)
-        self._fixed_pressure = fixed_pressure
-        self.footprints = Footprints()
-        self.friction = FrictionFelt(foot, expected_load)
+        self.footprints, self.friction = Footprints(), FrictionFelt(foot, expected_load)
         self._decisions = 0
-        self._legs = {
-            leg: _LegState(
-                leg,
-                _Ground(LoadGate(expected_load, lift_off_share, TOUCH_DOWN), 1.5 * expected_load),
-                _Air(PadMonitor(foot.ceiling)),
-                first[leg],
-            )
-            for leg in legs
-        }
         self.faults: list[FootFault] = []
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
         self.underpressure = dict.fromkeys(legs, 0)
-        for leg, state in self._legs.items():
-            self._apply(state, Choice(first[leg]))
+        self._legs: dict[int, _LegState] = {}
+        for leg in legs:
+            gate = LoadGate(expected_load, lift_off_share, TOUCH_DOWN)
+            ground, air = _Ground(gate, 1.5 * expected_load), _Air(PadMonitor(foot.ceiling))
+            self._legs[leg] = _LegState(leg, ground, air, first[leg])
+            self._apply(self._legs[leg], Choice(first[leg]))
 
     def _state(self, leg: int) -> _LegState:
-        state = self._legs.get(leg)
-        if state is None:
-            raise InvalidInput(
-                f'leg = {leg!r} is not allowed: one of {", ".join(map(str, self._legs))} is needed'
-            )
-        return state
+        if leg not in self._legs:
+            known = ', '.join(map(str, self._legs))
+            raise InvalidInput(f'leg = {leg!r} is not allowed: one of {known} is needed')
+        return self._legs[leg]
 
     def morphology(self, leg: int) -> str:
         """Return the morphology of a leg in the present step, or in swing in the next one.
@@ -393,34 +383,11 @@ class MorphologyController:
         InvalidInput
             For a leg that is not controlled.
         """
-        state = self._state(leg)
-        slow = ''
-        if state.lead:
-            slow = (
-                f'slow hose: a fill takes {state.air.monitor.fill_time:.2f} s, a swing'
-                f' {state.timing.swing.value:.2f} s'
-            )
+        state, slow = self._state(leg), ''
+        fill, swing = state.air.monitor.fill_time, state.ground.swing.value
+        if fill > swing:
+            slow = f'slow hose: a fill takes {fill:.2f} s, a swing {swing:.2f} s'
         return joined(self.refusals.get(leg), state.air.shortfall, slow)
-
-    def lead(self, leg: int) -> int:
-        """Return by how much the fill of a leg's pad takes longer than its swing.
-
-        Parameters
-        ----------
-        leg : int
-            Number of the leg.
-
-        Returns
-        -------
-        int
-            Whole steps.
-
-        Raises
-        ------
-        InvalidInput
-            For a leg that is not controlled.
-        """
-        return self._state(leg).lead
 
     def monitor(self, leg: int) -> PadMonitor:
         """Return the monitor of a leg's air.
@@ -467,65 +434,45 @@ class MorphologyController:
             For a leg that is not controlled.
         """
         state = self._state(leg)
-        timing, air = state.timing, state.air
+        air, monitor = state.air, state.air.monitor
         if doubt or state.sensors:
             state.sensors = Kind.DOUBT(doubt) if doubt else None
-        if not 0.0 <= time - timing.now <= self.command_timeout:
-            # the first time, or after a pause
-            timing.updated = time
-            timing.lifted = math.nan
-        timing.now = time
-        monitor = air.monitor
+        if not 0.0 <= time - state.now <= self.command_timeout:  # the first time, after a pause
+            state.updated, state.ground.lifted_at = time, math.nan
+        state.now = time
         before = monitor.fault
         monitor.update(time, air.sent, pressure)
-        if monitor.fault is not before:
-            self._follow_fault(air, before)
-        age = time - timing.updated
+        if monitor.fault and not before:
+            air.wait = air.patience
+        elif before and not monitor.fault:
+            air.patience = FIRST_WAIT
+            # If the supply is back, the pads of the other legs can be filled again, too.
+            for other in self._legs.values():
+                other.air.wait = 0
+        age = time - state.updated
         if age <= self.command_timeout:
             state.timeout = None
         elif not state.timeout:
             state.timeout = Kind.TIMEOUT(age)
-            self._time_out(state)
+            self.switches[leg] += state.morphology == DOME
+            self._apply(state, Choice(FLAT))
+            state.steps = math.inf
+            air.sent = None  # the regulator vents after its own timeout
         missed = self._decisions - state.decided
         if missed <= 2 * len(self._legs):
             state.no_step = None
         elif not state.no_step:
             state.no_step = Kind.NO_STEP(missed)
-        own = state.timeout or state.no_step or state.sensors
-        if own or monitor.fault or monitor.silence or state.lasting:
-            self._list_faults(state)
-
-    def _follow_fault(self, air: _Air, before: Fault | None) -> None:
-        """Wait with the next dome when a fault of the air begins; try all legs when one ends."""
-        if not air.monitor.fault:
-            # If the supply is back, the pads of the other legs can be filled again, too.
-            air.patience = FIRST_WAIT
-            for other in self._legs.values():
-                other.air.wait = 0
-        elif not before:
-            air.wait = air.patience
-
-    def _time_out(self, state: _LegState) -> None:
-        """Make a leg flat that has had no estimate for the command timeout."""
-        if state.morphology == DOME:
-            self.switches[state.leg] += 1
-        self._apply(state, Choice(FLAT))
-        state.steps = math.inf
-        state.air.sent = None  # the regulator vents after its own timeout
-
-    def _list_faults(self, state: _LegState) -> None:
-        """Update the list of faults: one entry from the start of a fault to its end."""
-        faults, lasting, now = state.present, state.lasting, state.timing.now
-        for place, fault in enumerate(faults):
-            entry = lasting.get(place)
-            if entry is None:
-                if fault:
-                    lasting[place] = FootFault(state.leg, now, None, fault)
-                    self.faults.append(lasting[place])
-            elif not fault:
-                lasting.pop(place).end = now
-            else:
+        # One entry of the list lasts from the start of a fault to its end.
+        for place, fault in enumerate(state.present):
+            entry = state.lasting.get(place)
+            if fault and entry:
                 entry.fault = fault  # it may have new numbers
+            elif fault:
+                state.lasting[place] = FootFault(leg, time, None, fault)
+                self.faults.append(state.lasting[place])
+            elif entry:
+                state.lasting.pop(place).end = time
 
     def update(
         self,
@@ -569,7 +516,7 @@ class MorphologyController:
                 f' finite, and wet_probability = {wet_probability!r} must be from 0 to 1; at least'
                 ' one is not'
             )
-        state.timing.updated = state.timing.now
+        state.updated = state.now
         ground, gate = state.ground, state.ground.gate
         stood = gate.standing
         if gate.update(load) and not stood:
@@ -584,12 +531,12 @@ class MorphologyController:
 
     def _touch_down(self, state: _LegState) -> None:
         """Compare the pressure of a dome with what its load needs."""
-        timing, air = state.timing, state.air
+        ground, air = state.ground, state.air
         air.shortfall = ''
-        if state.ground.lifted is None:
+        if ground.lifted is None:
             return  # the foot stood from the beginning: this is no step
-        if timing.now > timing.lifted:
-            timing.swing.add(timing.now - timing.lifted)
+        if state.now > ground.lifted_at:
+            ground.swing.add(state.now - ground.lifted_at)
         pressure = air.monitor.pressure
         if state.morphology == DOME and pressure < air.needed:
             self.underpressure[state.leg] += 1
@@ -631,22 +578,27 @@ class MorphologyController:
         self, state: _LegState, wet: float, position: Sequence[float], friction: float
     ) -> None:
         """Evaluate the step that ends, and choose the morphology of the next one."""
-        ground, timing = state.ground, state.timing
+        ground, air = state.ground, state.air
         state.steps += 1
-        ground.end_stance()
-        if timing.now > timing.lifted:
-            timing.stride.add(timing.now - timing.lifted)
-        timing.lifted = timing.now
-        if not (state.air.monitor.silence or state.sensors):
+        # The largest recent load decays over some tens of steps.
+        ground.peak = max(ground.largest, ground.peak + 0.1 * (ground.largest - ground.peak))
+        ground.largest, ground.lifted_at = 0.0, state.now
+        if not (air.monitor.silence or state.sensors):
             # A pad under pressure is not flat, even if its set-point is zero.
-            flat = state.morphology == FLAT and not state.air.holds
+            flat = state.morphology == FLAT and not air.holds
             if flat:
                 self.footprints.add(*ground.stood, wet)
-            if flat or state.air.holds:
+            if flat or air.holds:
                 self.friction.add(flat, wet, friction)
-        ahead = ground.next_position(position)
+        # The foot will stand there if its steps are of equal length.
+        x, y = position[0], position[1]
+        before_x, before_y = ground.lifted or (x, y)
+        ground.lifted, ahead = (x, y), (2.0 * x - before_x, 2.0 * y - before_y)
         self._decisions += 1
         state.decided = self._decisions
+        # A probing leg that has stopped stepping must not delay the probes of the others.
+        recent = self._decisions - 2 * len(self._legs)
+        others = (other for other in self._legs.values() if other is not state)
         step = LiftOff(
             leg=state.leg,
             morphology=self.morphology(state.leg),
@@ -654,7 +606,7 @@ class MorphologyController:
             probing=state.probing,
             wet_ahead=self.footprints.wet_probability(*ahead),
             next_position=ahead,
-            others_probing=self._others_probing(state),
+            others_probing=any(other.probing and other.decided > recent for other in others),
             flat_pays=self.friction.flat_pays,
         )
         before = state.morphology
@@ -663,30 +615,20 @@ class MorphologyController:
             self.switches[state.leg] += 1
             state.steps = 0
 
-    def _others_probing(self, state: _LegState) -> bool:
-        # A probing leg that has stopped stepping must not delay the probes of the others.
-        recent = self._decisions - 2 * len(self._legs)
-        others = (other for other in self._legs.values() if other is not state)
-        return any(other.probing and other.decided > recent for other in others)
-
     def _apply(self, state: _LegState, choice: Choice) -> None:
         """Apply a choice; make the leg flat if no pressure up to the ceiling carries the load."""
         air, peak = state.air, state.ground.peak
-        morphology = choice.morphology
-        setpoint = 0.0
+        state.morphology, state.setpoint, state.probing = choice.morphology, 0.0, choice.probe
         self.refusals.pop(state.leg, None)
-        if morphology == DOME:
-            try:
-                if self._fixed_pressure:
-                    setpoint = self._fixed_pressure
-                    air.needed = setpoint - air.monitor.tolerance
-                else:
-                    setpoint = dome_pressure(self._foot, peak, self.margin)
-                    air.needed = dome_pressure(self._foot, peak, 1.0)
-            except LimitError as error:
-                # Overloaded domes have less capacity than a flat sole.
-                self.refusals[state.leg] = str(error)
-                morphology = FLAT
-        state.morphology = morphology
-        state.probing = choice.probe
-        state.setpoint = setpoint
+        if choice.morphology == FLAT:
+            return
+        try:
+            if self._fixed_pressure:
+                state.setpoint = self._fixed_pressure
+                air.needed = self._fixed_pressure - air.monitor.tolerance
+            else:
+                state.setpoint = dome_pressure(self._foot, peak, self.margin)
+                air.needed = dome_pressure(self._foot, peak, 1.0)
+        except LimitError as error:
+            # Overloaded domes have less capacity than a flat sole.
+            self.refusals[state.leg], state.morphology = str(error), FLAT

@@ -168,8 +168,7 @@ def adaptive(
     >>> policy(LiftOff(1, 'flat', 3, False, 0.9, next_position=(0.1, 0), others_probing=False))
     Choice(morphology='dome', probe=False)
     """
-    given = (wet_above, dry_below, probe_below, dwell)
-    for setting, value in zip(SETTINGS, given, strict=True):
+    for setting, value in zip(SETTINGS, (wet_above, dry_below, probe_below, dwell), strict=True):
         setting.accept(value)
     number('policy.dry_below', dry_below, '', high=wet_above)
 
@@ -201,11 +200,7 @@ def oracle(is_wet: IsWet) -> Policy:
     callable
         Policy, as from :func:`adaptive`.
     """
-
-    def choose(step: LiftOff) -> Choice:
-        return Choice(DOME if is_wet(*step.next_position) else FLAT)
-
-    return choose
+    return lambda step: Choice(DOME if is_wet(*step.next_position) else FLAT)
 
 
 def first_morphologies(policy: str, legs: Sequence[int]) -> dict[int, str]:
@@ -278,16 +273,16 @@ def policy_named(
         For an unknown name, an oracle without ``is_wet``, or a parameter that the policy does not
         have or that is outside its range.
     """
+    choice('policy', name, POLICIES)
     if parameters and name != 'adaptive':
         raise InvalidInput(
             f'policy = {name!r} has no parameters, but {", ".join(parameters)} was given:'
             ' only the adaptive policy has parameters'
         )
-    for parameter in parameters or ():
-        choice('parameter of the adaptive policy', parameter, POLICY_PARAMETERS)
     if name == 'oracle':
         if is_wet is None:
             raise InvalidInput("policy = 'oracle' needs the map of the floor (is_wet)")
         return oracle(is_wet)
-    policies = {'flat': flat, 'dome': dome, 'adaptive': adaptive(**(parameters or {}))}
-    return policies[choice('policy', name, POLICIES)]
+    for parameter in parameters or ():
+        choice('parameter of the adaptive policy', parameter, POLICY_PARAMETERS)
+    return {'flat': flat, 'dome': dome}.get(name) or adaptive(**(parameters or {}))

@@ -2,8 +2,7 @@
 """Estimate slip, wetness, friction and friction margin of feet from their forces and motions."""
 
 from ros_pad.estimation.doubt import FAULTS, KINDS
-from ros_pad.estimation.feet import FeetEstimator
-from ros_pad.estimation.foot import ContactMotion, Estimate, FootEstimator
+from ros_pad.estimation.foot import ContactMotion, Estimate, FeetEstimator, FootEstimator
 from ros_pad.estimation.tuning import SETTINGS, Tuning
 
 DOUBTS = KINDS

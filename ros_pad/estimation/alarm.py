@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from ros_pad.configuration import number
 
@@ -48,8 +48,6 @@ class SlipAlarm:
         When a value is outside its range; the message names it.
     """
 
-    __slots__ = ('_correlation_time', '_highest', '_speeds', '_threshold', 'statistics')
-
     def __init__(
         self,
         correlation_time: float,
@@ -66,25 +64,15 @@ class SlipAlarm:
         """Discard all evidence; call it at touch-down."""
         self.statistics = [0.0] * len(self._speeds)
 
-    def update(self, samples: Iterable[tuple[float, float, float]]) -> bool:
-        """Process slip speeds, m/s, with their deviations, m/s, dt seconds after the last ones.
+    def update(self, speed: float, noise: float, dt: float) -> bool:
+        """Process a slip speed, m/s, with its deviation, m/s, dt seconds after the last one.
 
-        Return whether the alarm is on after the last one.
+        Return whether the alarm is on.
         """
-        weighed = []
-        for speed, noise, dt in samples:
-            stretch = self._correlation_time / dt
-            weighed.append((speed, noise * noise * (stretch if stretch > 1.0 else 1.0)))
-        threshold, highest, raised = self._threshold, self._highest, False
+        variance = noise * noise * max(self._correlation_time / dt, 1.0)
+        raised = False
         for test, designed in enumerate(self._speeds):
-            statistic, half, on = self.statistics[test], 0.5 * designed, False
-            for speed, variance in weighed:
-                statistic += designed / variance * (speed - half)
-                on = statistic > threshold
-                if not statistic > 0.0:
-                    statistic = 0.0
-                elif statistic > highest:
-                    statistic = highest
-            self.statistics[test] = statistic
-            raised = raised or on
+            statistic = self.statistics[test] + designed / variance * (speed - 0.5 * designed)
+            raised |= statistic > self._threshold
+            self.statistics[test] = min(max(0.0, statistic), self._highest)
         return raised

@@ -4,20 +4,17 @@
 The ground pushes a foot up, and against its slip; a foot that sticks moves back by force over
 shear stiffness; a foot swings above the heights at which it stands. What is measured in other axes
 does none of these. Each stance, or second of a long one, is a witness, and no single one decides.
-A driver turns the axes of all feet alike: the feet of a robot share their witnesses.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from operator import add
 
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.friction import SLIP_SPEED
-from ros_pad.estimation.scales import DELAY
 
 LOADED, UNLOADED = 0.5, 0.3
 """Size of the force from which on, and below which, a foot counts as loaded, share of the expected
@@ -57,9 +54,6 @@ least."""
 STANCES = 2
 """Witnesses of a wrong normal axis, or swings below stances, that make a doubt."""
 
-SEVERAL = 2.0 * MOST
-"""Most evidence of all other feet together, nats: one that is sure of its own axes keeps them."""
-
 Matrix = tuple[float, float, float, float]
 
 TURNS: tuple[Matrix, ...] = (
@@ -72,41 +66,8 @@ horizontal force to the measured one."""
 Vector = tuple[float, float, float]
 
 
-class SharedAxes:
-    """Evidence of turned axes in the stances of each foot of a robot."""
-
-    def __init__(self) -> None:
-        self._sums: list[deque[tuple[float, list[float], list[float]]]] = []
-
-    def join(self) -> int:
-        """Return the number of one more foot."""
-        self._sums.append(deque(maxlen=4))
-        return len(self._sums) - 1
-
-    def add(self, time: float, foot: int, sure: list[float], raw: list[float]) -> None:
-        """Keep the bounded and the plain sums of a foot, nats by turn, from a time on, s."""
-        self._sums[foot].append((time, sure, raw))
-
-    def others(self, time: float, foot: int) -> tuple[list[float], list[float]]:
-        """Return the sums of all other feet, bounded and plain, at a time, s.
-
-        Only those that are older by :data:`DELAY` count: results must not depend on which of two
-        feet is read first.
-        """
-        sure, raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
-        for number, sums in enumerate(self._sums):
-            old = [each for each in sums if each[0] <= time - DELAY]
-            if number != foot and old:
-                _, more, plain = old[-1]
-                sure = [a + b if b < MOST else a + MOST for a, b in zip(sure, more, strict=True)]
-                raw = [*map(add, raw, plain)]
-        return [min(SEVERAL, each) for each in sure], raw
-
-
 class Stance:
     """Sums over a stance, or a second of one."""
-
-    __slots__ = ('duration', 'force', 'heights', 'last', 'likely')
 
     def __init__(self) -> None:
         self.force, self.heights, self.duration = (0.0, 0.0, 0.0), 0.0, 0.0
@@ -124,33 +85,24 @@ class Stance:
 class Heights:
     """Whether a foot swings below the heights at which it stands."""
 
-    __slots__ = ('below', 'highest', 'last', 'lowest')
-
     def __init__(self) -> None:
         self.below = 0  # swings in a row
         self.restart()
 
     def restart(self) -> None:
         """Forget the height of the last stance."""
-        self.last = math.nan  # mean of the last stance, m
+        self._last = math.nan  # mean of the last stance, m
         self.lowest, self.highest = math.inf, -math.inf  # since then, m
-
-    def swing(self, height: float) -> None:
-        """Process a height in the air, m."""
-        if height < self.lowest:
-            self.lowest = height
-        if height > self.highest:
-            self.highest = height
 
     def stand(self, height: float) -> None:
         """Process the mean height of a stance, m."""
-        last = height if math.isnan(self.last) else self.last
+        last = height if math.isnan(self._last) else self._last
         lowest, highest = min(height, last), max(height, last)
         if self.lowest < lowest - BELOW and self.highest < lowest + BELOW:
             self.below = min(STANCES, self.below + 1)
         elif self.highest > highest + BELOW:
             self.below = 0
-        self.last, self.lowest, self.highest = height, math.inf, -math.inf
+        self._last, self.lowest, self.highest = height, math.inf, -math.inf
 
 
 class Axes:
@@ -164,8 +116,6 @@ class Axes:
         Motion of the position against the contact, per tangential force, m/N.
     memory : float
         Time over which errors of the motion are the same, s.
-    shared : SharedAxes or None
-        Evidence of the other feet of the robot; None: this one is alone.
 
     Attributes
     ----------
@@ -173,22 +123,9 @@ class Axes:
         Why the axes cannot be right, with the likely turn; none if they can.
     """
 
-    __slots__ = (
-        '_expected_load', '_foot', '_heights', '_loaded', '_raw', '_shared', '_softness',
-        '_stance', '_steep', '_sure', '_weight', 'doubt',
-    )  # fmt: skip
-
-    def __init__(
-        self,
-        expected_load: float,
-        softness: float,
-        memory: float = BLOCK,
-        shared: SharedAxes | None = None,
-    ) -> None:
+    def __init__(self, expected_load: float, softness: float, memory: float = BLOCK) -> None:
         self._expected_load, self._softness = expected_load, softness
         self._weight = 0.5 * BLOCK / memory  # blocks that follow each other agree
-        self._shared = shared or SharedAxes()
-        self._foot = self._shared.join()
         self._steep, self._heights = 0, Heights()
         self._sure, self._raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
         self.doubt = Doubt()
@@ -200,7 +137,7 @@ class Axes:
         self._loaded = False
         self._stance = Stance()
 
-    def update(self, time: float, duration: float, height: float, force: Vector) -> bool:
+    def update(self, duration: float, height: float, force: Vector) -> bool:
         """Process a position's height, m, and a force without offset, N, about every `BLOCK`.
 
         ``duration``, s, is the time since the last one. Return whether the foot has been loaded
@@ -209,14 +146,14 @@ class Axes:
         x, y, z = force
         size = math.sqrt(x * x + y * y + z * z)
         if not self._loaded:
-            self._heights.swing(height)
+            self._heights.lowest = min(self._heights.lowest, height)
+            self._heights.highest = max(self._heights.highest, height)
             if size > LOADED * self._expected_load:
                 self._loaded = True
                 self._stance = Stance()
-                self._judge(time)
             return False
         if size < UNLOADED * self._expected_load or self._stance.duration > LONGEST:
-            self._end_stance(time)
+            self._end_stance()
             return False
         self._stance.add(duration, height, force)
         return True
@@ -243,7 +180,7 @@ class Axes:
         found = likelihoods(move, change, force, sd, duration, pulled)
         stance.likely = [*map(add, stance.likely, found)]
 
-    def _end_stance(self, time: float) -> None:
+    def _end_stance(self) -> None:
         """Add the evidence of a stance, or of a second of one."""
         self._loaded, stance = False, self._stance
         if stance.duration < SHORTEST:
@@ -257,25 +194,20 @@ class Axes:
             self._raw[turn] = max(-3.0 * SURE, self._raw[turn] + more)
             sure = self._sure[turn] + min(MOST, max(LEAST, more))
             self._sure[turn] = min(3.0 * SURE, max(-SURE, sure))
-        self._shared.add(time, self._foot, [*self._sure], [*self._raw])
-        self._judge(time, mean)
+        self._judge(mean)
 
-    def _judge(self, time: float, mean: Sequence[float] = ()) -> None:
-        """Set the doubt at a time, s; after a stance with its mean force, N."""
+    def _judge(self, mean: Sequence[float]) -> None:
+        """Set the doubt after a stance with its mean force, N."""
         if self._steep >= STANCES:
-            if mean:
-                axis = max(range(3), key=lambda each: abs(mean[each]))
-                code = doubt.UPSIDE_DOWN if axis == 2 else doubt.NORMAL
-                self.doubt = Doubt(code, axis, mean[axis])
-            return
-        if self._heights.below >= STANCES:
+            axis = max(range(3), key=lambda each: abs(mean[each]))
+            code = doubt.UPSIDE_DOWN if axis == 2 else doubt.NORMAL
+            self.doubt = Doubt(code, axis, mean[axis])
+        elif self._heights.below >= STANCES:
             self.doubt = Doubt(doubt.BELOW)
-            return
-        sure, raw = self._shared.others(time, self._foot)
-        raw, sure = [*map(add, raw, self._raw)], [*map(add, sure, self._sure)]
-        turn = raw.index(max(raw))
-        doubted = turn and max(sure) >= (0.5 * SURE if self.doubt.code else SURE)
-        self.doubt = Doubt(doubt.TURNED, turn) if doubted else Doubt()
+        else:
+            turn = self._raw.index(max(self._raw))
+            sure = max(self._sure) >= (0.5 * SURE if self.doubt.code else SURE)
+            self.doubt = Doubt(doubt.TURNED, turn) if turn and sure else Doubt()
 
 
 def likelihoods(

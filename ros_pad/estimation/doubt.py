@@ -6,9 +6,10 @@ The kind of a doubt is the part of its text before the colon.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from ros_pad.estimation.parts import Stance
+if TYPE_CHECKING:
+    from ros_pad.estimation.ground import Stance
 
 CONCLUSIVE = 1.0
 """Change of the log odds of wet ground, up or down, above which a stance is conclusive."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -25,11 +25,6 @@ from ros_pad.estimation.tuning import Tuning
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
 _ONES = np.ones_like(GRID)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
-
-Posterior: TypeAlias = tuple[np.ndarray, bool]
-"""Joint probabilities of ground (dry, wet) and friction, shape (2, grid), and whether the friction
-is that of a dome.
-"""
 
 DEMAND = 0.3
 """Mean T/N that gaits demand; its distribution is assumed exponential."""
@@ -220,11 +215,6 @@ class GroundFilter:
         Change of the log odds of wet ground by this stance: about zero if it gave no evidence.
     """
 
-    __slots__ = (
-        '_counted', '_dome', '_felt', '_foot', '_posterior', '_summed', '_travelled',
-        '_wet_before', 'expected', 'log_odds', 'model', 'scales', 'shared', 'wet_probability',
-    )  # fmt: skip
-
     def __init__(self, model: GroundModel) -> None:
         self.model, self.shared = model, model.shared
         self._foot = self.shared.join()
@@ -281,19 +271,17 @@ class GroundFilter:
         self.shared.forget(self._foot)
         self.expected = self.shared.expected(time)
         self._counted = {False: -math.inf, True: -math.inf}
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the prior."""
         self._normalise(self.model.grounds * self._priors)
         self._begin()
 
     @property
-    def posterior(self) -> Posterior:
-        """What is known of the ground; set it to an earlier one to undo the samples since then."""
-        return self._posterior, self._dome
-
-    @posterior.setter
-    def posterior(self, posterior: Posterior) -> None:
-        grid, self._dome = posterior
-        self._normalise(grid)
-        self._begin()
+    def posterior(self) -> np.ndarray:
+        """Joint probabilities of ground (dry, wet) and friction, shape (2, grid)."""
+        return self._posterior
 
     def update(self, sample: Evidence) -> None:
         """Process one sample of T/N and of slip speed."""

@@ -4,22 +4,64 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from ros_pad.contact.resistance import THICK_FILM, Foot
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
-from ros_pad.estimation.parts import History, Path, Stance, Window
 from ros_pad.estimation.scales import FrictionPrior, FrictionScales
-from ros_pad.estimation.sensing import DEAD
 from ros_pad.estimation.tuning import Tuning
-from ros_pad.estimation.watch import LONGEST_GAP
 
-HINDSIGHT = DEAD + LONGEST_GAP
-"""Time for which earlier posteriors are kept, s: no sensor fault stays undetected for longer."""
+if TYPE_CHECKING:
+    from ros_pad.estimation.track import Window
 
 MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
+
+
+LONGEST_GAP = 0.15
+"""Longest gap between samples of one stance, s: in a longer gap the foot may have stepped."""
+
+NEW_PLACE = 5e-4
+"""Distance over which a sliding foot meets new ground, m."""
+
+
+class Stance:
+    """Evidence of one stance.
+
+    Attributes
+    ----------
+    dome_share : float
+        Share of the expected load that domes carry, 0 to 1.
+    peak_ratio, peak_turning : float
+        Largest T/N of the pull, and of the friction used by turning, each
+        as the mean of a window.
+    counted : tuple of float or None
+        T/N and place, m, of what earlier windows have shown; None to give the next full weight.
+    """
+
+    def __init__(self, dome_share: float = 0.0) -> None:
+        self.dome_share = dome_share
+        self.peak_ratio = self.peak_turning = 0.0
+        self.counted: tuple[float, float, float] | None = None
+
+    def weight(self, ratio: float, noise: float, x: float, y: float) -> float:
+        """Return the share of a window that is new evidence, 0 to 1.
+
+        A foot at the same place under the same pull repeats its measurement. So the weight grows
+        with the change of T/N (relative to its noise) and of the place, m, since earlier windows.
+        """
+        if self.counted is None:
+            self.counted = ratio, x, y
+            return 1.0
+        old_ratio, old_x, old_y = self.counted
+        pull, dx, dy = ratio - old_ratio, x - old_x, y - old_y
+        change = (pull / noise) ** 2 + (dx * dx + dy * dy) / NEW_PLACE**2
+        weight = -math.expm1(-0.5 * change)
+        self.counted = old_ratio + weight * pull, old_x + weight * dx, old_y + weight * dy
+        return weight
 
 
 class Ground:
@@ -55,7 +97,8 @@ class Ground:
     ) -> None:
         self.foot, self.expected_load, self.tuning = foot, expected_load, tuning
         self.filter = GroundFilter(model)
-        self._path, self._history, self._stance = Path(), History(HINDSIGHT), Stance()
+        self._stance = Stance()
+        self._footprint: tuple[float, float] | None = None  # of the last stance, m
         self.belief = (tuning.wet_prior, *self.filter.friction)
         self.quantile = self.filter.quantile(MARGIN_SHARE)
         self.doubt = Doubt(doubt.NOT_YET)
@@ -63,37 +106,18 @@ class Ground:
     def touch_down(self, time: float, x: float, y: float, pressure: float) -> None:
         """Begin a stance at a time, s, and place, m, with a pressure, Pa."""
         self._stance = Stance(self._share_on_domes(pressure))
-        distance = self._path.touch_down(time, x, y)
+        distance = math.dist(self._footprint or (x, y), (x, y))
+        self._footprint = x, y
         self.filter.touch_down(distance, self._stance.dome_share > doubt.DOMED, time)
-        self._history.add(time, self.filter.posterior)
         self.quantile = self.filter.quantile(MARGIN_SHARE)
 
-    def lose(self, dt: float, place: tuple[float, float] | None, since: float, why: Doubt) -> bool:
-        """Undo what the foot has felt since a time, s, as its sensors are in doubt, and fade.
-
-        The sample is dt seconds after the last one, at a place, m, None if that is unknown.
-        Return whether the posterior has changed.
-        """
-        ground, path = self.filter, self._path
-        posterior = self._history.undo(since)
-        if posterior is not None:
-            ground.posterior = posterior
-        distance = path.seen(*place) if place else path.unseen(dt)
-        if distance:
-            ground.fade(distance)
-        changed = posterior is not None or distance > 0.0
-        friction = ground.friction if changed else self.belief[1:]
-        self.belief, self.doubt = (ground.wet_probability, *friction), why
-        return changed
-
-    def set_back(self) -> None:
-        """Forget times, because the clock has been set back."""
-        self._path.restart()
-        self._history.clear()
+    def lose(self) -> None:
+        """Return to the prior, because the sensors are in doubt."""
+        self.filter.reset()
+        self.belief = self.filter.wet_probability, *self.filter.friction
 
     def forget(self, time: float) -> None:
         """Forget what the foot has learnt in wrong axes until a time, s."""
-        self._history.clear()
         self.filter.forget(time)
         self.belief = self.belief[0], *self.filter.friction
 
@@ -101,7 +125,7 @@ class Ground:
         self,
         time: float,
         window: Window,
-        place: tuple[float, float],
+        place: Sequence[float],
         pressure: float,
         noises: tuple[float, float, float],
         turning_known: bool,
@@ -127,7 +151,6 @@ class Ground:
         ground, stance = self.filter, self._stance
         self._follow_pressure(time, pressure)
         ground.update(self._evidence(time - window.start, window, place, noises, turning_known))
-        self._history.add(time, ground.posterior)
         self.quantile = ground.quantile(MARGIN_SHARE)
         self.belief = ground.wet_probability, *ground.friction
         self.doubt = doubt.of_ground(
@@ -151,7 +174,7 @@ class Ground:
         self,
         duration: float,
         window: Window,
-        place: tuple[float, float],
+        place: Sequence[float],
         noises: tuple[float, float, float],
         turning_known: bool,
     ) -> Evidence:

@@ -66,8 +66,6 @@ class Pool:
         Median of the last :data:`KEPT_WINDOWS` values.
     """
 
-    __slots__ = ('_recent', '_sorted', 'median')
-
     def __init__(self, prior: float) -> None:
         self._sorted = [prior] * PRIOR_WINDOWS
         self._recent = deque(self._sorted)
@@ -100,8 +98,6 @@ class Meter:
         Standard deviation of the white noise that has the same effect on means over a block:
         `white`, or more if noise is correlated in time or the sensor has steps.
     """
-
-    __slots__ = ('_ratios', '_step', '_steps', '_variances', 'configured', 'noise', 'white')
 
     def __init__(self, configured: float) -> None:
         self.configured = self.white = self.noise = configured
@@ -154,8 +150,6 @@ class SensorNoise:
     position, force : Meter
         Noise of a coordinate, m, and of a component of the force, N.
     """
-
-    __slots__ = ('_blocks', '_steady', '_windows', 'force', 'position')
 
     def __init__(self, position: float, force: float, load: float) -> None:
         self.position, self.force = Meter(position), Meter(force)

@@ -17,7 +17,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.feet import (
+from ros_pad.estimation.foot import (
     LARGEST_FORCE,
     LARGEST_POSITION,
     FeetEstimator,
@@ -27,7 +27,7 @@ from ros_pad.estimation.feet import (
 from ros_pad.estimation.track import Sample
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.pace import CONTROL_PERIOD_NS, Pace
-from ros_pad.records import ESTIMATE, SAMPLE, Array, Block
+from ros_pad.records import ESTIMATE, Block
 
 PUBLISH_RATE = Setting(
     'publish_rate', 1e9 / CONTROL_PERIOD_NS, 'Estimates a second.', 'Hz', 5.0, 1000.0
@@ -37,55 +37,28 @@ SILENCE = 0.4
 """Time without a sample after which the sensors of a foot count as faulty, s."""
 
 
-class Arrivals:
-    """What has come from the sensors of a foot.
-
-    Parameters
-    ----------
-    tuning : Tuning
-        Settings for sensors and ground.
-
-    Attributes
-    ----------
-    time : float
-        Time of the last sample used, s.
-    place : tuple of float
-        Last position x and y since the last estimate, m; NaN if none has come.
-    load : float
-        Largest normal force since the last estimate, N, also of refused samples; NaN if there is
-        none.
-    silence : Doubt or None
-        That no sample has been used for long; None if one has.
-    missing : int
-        Code of the doubt that follows from silence.
-    used : int
-        Number of samples used so far.
-    """
-
-    __slots__ = (
-        '_joints', '_moments', '_position', '_seen_ns', '_silent_ns', 'load', 'missing', 'place',
-        'silence', 'time', 'used',
-    )  # fmt: skip
+class _Arrivals:
+    """What has come from the sensors of a foot."""
 
     def __init__(self, tuning: Tuning) -> None:
         self._joints, self._moments = tuning.source == 'joints', tuning.moment_noise > 0.0
         self._position: Sequence[float] = ()  # last one, m
         self._seen_ns = 0  # stamp of the sample with which that was first used
+        self.time = -math.inf  # of the last sample used, s
+        self.used = 0  # number of samples used so far
+        self._use()
         self.clear()
-        self.used = 0
-        self.use(-math.inf, 0)
 
     def clear(self) -> None:
         """Begin anew after an estimate."""
-        self.place: tuple[float, ...] = (math.nan, math.nan)
-        self.load = math.nan
+        self.place: tuple[float, ...] = (math.nan, math.nan)  # last position since then, m
+        self.load = math.nan  # largest normal force since then, N, also of refused samples
 
-    def use(self, time: float, count: int) -> None:
-        """Take note that samples up to a time, s, are used."""
-        self.used += count
-        self.time, self.missing = time, doubt.NO_WRENCH
+    def _use(self) -> None:
+        """Take note that a sample is used."""
+        self.missing = doubt.NO_WRENCH  # code of the doubt that follows from silence
         self._silent_ns: int | None = None  # since when, as far as it was noticed
-        self.silence: Doubt | None = None
+        self.silence: Doubt | None = None  # that no sample has been used for long
 
     def tick(self, now_ns: int) -> None:
         """Check at a time, ns, for how long nothing has been used."""
@@ -95,14 +68,6 @@ class Arrivals:
         if silence > SILENCE:
             self.silence = Doubt(self.missing, silence)
 
-    def note(self, stamp_ns: int, position: Sequence[float], load: float, count: int) -> None:
-        """Take note of so many samples that are all used: the last position, and most load."""
-        self._position, self._seen_ns = position, stamp_ns
-        self.place = position[0], position[1]
-        if not load <= self.load:
-            self.load = load
-        self.use(stamp_ns * 1e-9, count)
-
     def take(self, stamp_ns: int, sample: Sample) -> Sample | None:
         """Return the sample to use of the numbers of a row; None if something is missing.
 
@@ -111,8 +76,9 @@ class Arrivals:
         InvalidInput
             When a number is too large or infinite, or the time does not advance.
         """
-        time, (fx, fy, fz, moment, *position, vx, vy, xx, yy, age) = stamp_ns * 1e-9, sample
-        new = all(map(math.isfinite, position))
+        time, age = stamp_ns * 1e-9, 0.0
+        fx, fy, fz, moment, *position, vx, vy, xx, yy = sample
+        new = math.isfinite(sum(position))
         if new and max(map(abs, position)) <= LARGEST_POSITION:
             self.place = position[0], position[1]
         if fz <= LARGEST_FORCE and not fz <= self.load and fz > -math.inf:
@@ -138,7 +104,9 @@ class Arrivals:
         if new and not wrong:
             self._position, self._seen_ns = position, stamp_ns
         refuse(time, self.time, wrong)
-        self.use(time, 1)
+        self.time = time
+        self.used += 1
+        self._use()
         return found
 
     def _miss(self, code: int) -> None:
@@ -190,7 +158,7 @@ class EstimationStage:
     ) -> None:
         self.estimator = FeetEstimator(len(legs), foot, expected_load, tuning)
         self._legs, self._reject, self._pace = legs, reject, Pace(period_ns)
-        self._arrivals = [Arrivals(tuning) for _ in legs]
+        self._arrivals = [_Arrivals(tuning) for _ in legs]
         self._pressures = [0.0] * len(legs)
         self.samples = self.last_ns = 0
 
@@ -203,63 +171,24 @@ class EstimationStage:
     def process(self, block: Block) -> list[Block]:
         """Process samples; return the estimates that are due in them."""
         numbers = np.ascontiguousarray(block.rows).view(float).reshape(*block.rows.shape, -1)
-        values = np.zeros((*block.rows.shape, len(SAMPLE.columns) + 1))
-        values[:, :, :-1] = numbers
-        stamps, found, first = block.stamps.tolist(), [], 0
-        for end, stamp_ns in enumerate(stamps, 1):
-            due = self._pace.due(stamp_ns)
-            if due or end == len(stamps):
-                self._use(stamps[first:end], values[first:end])
-                first = end
+        found = []
+        for stamp_ns, moment in zip(block.stamps.tolist(), numbers.tolist(), strict=True):
+            samples = [self._take(place, stamp_ns, each) for place, each in enumerate(moment)]
+            self.estimator.update(stamp_ns * 1e-9, samples, self._pressures)
+            if any(samples):
+                self.samples += 1
+                self.last_ns = stamp_ns
             # Who waits for an estimate receives one, also of feet without samples.
-            if due:
+            if self._pace.due(stamp_ns):
                 found.append(self.estimate(stamp_ns))
                 for each in self._arrivals:
                     each.clear()
         return found
 
-    def _use(self, stamps: list[int], values: Array) -> None:
-        """Use all samples that can be used."""
-        times, quiet = [each * 1e-9 for each in stamps], None
-        rows: list[list[Sample]] = values.transpose(1, 0, 2).tolist()
-        samples: Sequence[Sequence[Sample | None]] = rows
-        if self._ordinary(stamps, values):
-            quiet = self.estimator.quiet(times, values)
-            loads = values[:, :, 2].max(axis=0).tolist()
-            for each, mine, load in zip(self._arrivals, rows, loads, strict=True):
-                each.note(stamps[-1], mine[-1][4:7], load, len(stamps))
-        else:
-            samples = [
-                [self._take(place, *each) for each in zip(stamps, mine, strict=True)]
-                for place, mine in enumerate(rows)
-            ]
-        self.estimator.update(times, samples, self._pressures, quiet)
-        for stamp_ns, *moment in zip(stamps, *samples, strict=True):
-            if any(moment):
-                self.samples += 1
-                self.last_ns = stamp_ns
-
     @property
     def used(self) -> npt.NDArray[np.int64]:
         """Number of samples used so far, by foot."""
         return np.array([each.used for each in self._arrivals])
-
-    def _ordinary(self, stamps: list[int], values: Array) -> bool:
-        """Return whether all samples can be used."""
-        last = max(each.time for each in self._arrivals)
-        if stamps[0] * 1e-9 <= last or sorted(set(stamps)) != stamps:
-            return False
-        # Not a number is not within limits either.
-        forces, places = np.abs(values[:, :, :3]).max(), np.abs(values[:, :, 4:7]).max()
-        if not (forces <= LARGEST_FORCE and places <= LARGEST_POSITION):
-            return False
-        tuning = self.estimator.tuning
-        if tuning.moment_noise > 0.0 and (np.abs(values[:, :, 3]) > LARGEST_FORCE).any():
-            return False
-        # A variance that is infinite, whatever the velocity, is for the check of single samples.
-        return tuning.source != 'joints' or bool(
-            np.isfinite(values[:, :, 7:]).all() and (values[:, :, 9:] >= 0.0).all()
-        )
 
     def _take(self, place: int, stamp_ns: int, sample: Sample) -> Sample | None:
         """Return the sample of a foot to use, if there is one."""

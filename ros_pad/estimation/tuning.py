@@ -10,7 +10,6 @@ from typing import Any
 from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.alarm import THRESHOLD
-from ros_pad.estimation.load_gate import CONTACT_SHARE
 from ros_pad.estimation.scales import CLASSES, SCALE_RANGE, SCALE_SD, SCALE_SD_RANGE, Scale
 
 EXPECTED_LOAD = Setting(
@@ -77,7 +76,7 @@ class Tuning:
         'Largest component of force that a sensor can show; 0: not known.', 'N', 0.0, 1e5,
     )
     load_gate: float = _field(
-        'load_gate', CONTACT_SHARE, 'Share of the expected load above which a foot stands.',
+        'load_gate', 0.1, 'Share of the expected load above which a foot stands.',
         '', 0.001, 1.0,
     )
     smoothing: float = _field(

@@ -4,13 +4,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 from ros_pad.estimation.axes import BLOCK, LONGEST, Axes, Vector
+from ros_pad.estimation.ground import LONGEST_GAP
 from ros_pad.estimation.noise import SensorNoise
-
-LONGEST_GAP = 0.15
-"""Longest gap between samples of one stance, s: in a longer gap the foot may have stepped."""
 
 EAGER, PAUSE = 10, 8
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
@@ -33,11 +30,11 @@ class Watch:
         As given.
     end : float
         Time at which the present block ends, s.
+    readings : list of tuple
+        Time, s, position x and y, m, and force, N, since the last block, and two before them.
     looks : bool
         Whether noise is measured, and motions are compared, in this stance.
     """
-
-    __slots__ = ('_block', '_earlier', '_look_end', '_looked', 'axes', 'end', 'looks', 'noise')
 
     def __init__(self, noise: SensorNoise, axes: Axes) -> None:
         self.noise, self.axes = noise, axes
@@ -48,9 +45,8 @@ class Watch:
         """Forget the last readings, and the height of the last stance."""
         self.axes.restart()
         self.end = -math.inf
-        # Readings since the last block, and two before them; how many are before them.
-        self._block: list[tuple[float, ...]] = []
-        self._earlier = 0
+        self.readings: list[tuple[float, ...]] = []
+        self._earlier = 0  # readings before the block
 
     def look(self, time: float) -> None:
         """Decide whether to look at the readings of a stance, or of a second of a long one.
@@ -60,12 +56,8 @@ class Watch:
         self._looked += 1
         self.looks = self._looked <= EAGER or self._looked % PAUSE == 0
         self._look_end = time + LONGEST
-        self._block, self._earlier = [], 0
+        self.readings, self._earlier = [], 0
         self.noise.begin()
-
-    def note(self, readings: Iterable[tuple[float, ...]]) -> None:
-        """Take note of readings: time, s, position x and y, m, and force, N."""
-        self._block.extend(readings)
 
     def end_block(
         self,
@@ -93,14 +85,14 @@ class Watch:
         speed_sd : float or None
             With joints, standard deviation of the velocity, m/s; infinite if it must not be used.
         """
-        block, earlier = self._block, self._earlier
+        block, earlier = self.readings, self._earlier
         duration = time - self.end + BLOCK
-        self._block, self._earlier = block[-2:], min(2, len(block))
+        self.readings, self._earlier = block[-2:], min(2, len(block))
         self.end = time + BLOCK - 1e-9
         if duration > BLOCK + LONGEST_GAP or speed_sd == math.inf:
             self.axes.restart()
             return False
-        loaded = self.axes.update(time, duration, height, force)
+        loaded = self.axes.update(duration, height, force)
         measured, count = False, len(block) - earlier
         if self.looks and count:
             columns = [*zip(*block, strict=True)]

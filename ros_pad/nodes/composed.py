@@ -149,62 +149,37 @@ class ComposedTrial:
         tuning: Tuning,
     ) -> None:
         """Make the nodes: the recorder first; last the simulator, which starts the trial."""
-        scene = self.scene
-        legs, foot = list(scene.legs), scene.foot.source
-        shared = {'use_sim_time': True, 'legs': legs, 'foot': foot}
-        loaded = shared | {'expected_load': scene.expected_load}
-        ground = {'scene': scene.source, 'seed': seed}
-
+        scene, joints = self.scene, sensing == 'joints'
+        foot, ground = scene.foot.source, {'scene': scene.source, 'seed': seed}
+        timed = {'use_sim_time': True, 'legs': list(scene.legs)}
+        loaded = timed | {'foot': foot, 'expected_load': scene.expected_load}
         about = label(scene, policy, seed, fidelity, sensing=sensing)
-        self.recorder = self._add(
-            partial(RecorderNode, about),
-            use_sim_time=True,
-            legs=legs,
-            folder=os.fspath(bag),
-        )
+        self.recorder = self._add(partial(RecorderNode, about), folder=os.fspath(bag), **timed)
         # The node gets the options of the scene, not its name, because the scene in memory may
         # differ from its file.
-        options = {
-            f'{BACKEND_OPTIONS}.{key}': value for key, value in scene.regulator_options.items()
-        }
+        options = scene.regulator_options.items()
+        own = {f'{BACKEND_OPTIONS}.{key}': value for key, value in options}
         self.regulator = self._add(
-            RegulatorNode,
-            ceiling=scene.foot.ceiling,
-            **shared,
-            **options,
+            RegulatorNode, ceiling=scene.foot.ceiling, foot=foot, **timed, **own
         )
         self.body_estimator = None
-        if sensing == 'joints':
+        if joints:
             assert isinstance(scene.body, LeggedBody)
-            self.body_estimator = self._add(
-                BodyEstimatorNode,
-                use_sim_time=True,
-                legs=legs,
-                robot=scene.body.robot.source,
-                foot_radius=0.0,  # a sole on an ankle
-                **body_settings_for(scene),
-            )
-        self.estimator = self._add(
-            EstimatorNode,
-            **{each.name: getattr(tuning, attribute(each)) for each in SETTINGS},
-            **loaded,
-        )
+            own = body_settings_for(scene) | {'robot': scene.body.robot.source}
+            # Its soles are on ankles.
+            self.body_estimator = self._add(BodyEstimatorNode, foot_radius=0.0, **timed, **own)
+        own = {each.name: getattr(tuning, attribute(each)) for each in SETTINGS}
+        self.estimator = self._add(EstimatorNode, **own, **loaded)
+        own = ground if policy == 'oracle' else {}
         self.controller = self._add(
             ControllerNode,
             policy=policy,
             dome_pressure=scene.dome_pressure or 0.0,
             **loaded,
-            **(ground if policy == 'oracle' else {}),
+            **own,
         )
-        self.simulator = self._add(
-            SimulatorNode,
-            foot=foot,
-            fidelity=fidelity,
-            sensing=sensing,
-            publish_clock=True,
-            free_running=False,
-            **ground,
-        )
+        own = {'fidelity': fidelity, 'sensing': sensing, 'publish_clock': True}
+        self.simulator = self._add(SimulatorNode, foot=foot, free_running=False, **own, **ground)
 
     def _discover(self) -> None:
         deadline = time.monotonic() + PATIENCE
@@ -305,7 +280,7 @@ class ComposedTrial:
     def _vent(self) -> None:
         """Deactivate the regulator node, and advance time until the pads are flat."""
         self.regulator.trigger_deactivate()
-        simulator, channels = self.simulator, self.regulator.channels.values()
+        simulator, channels = self.simulator, self.regulator.supervision.channels
         samples = max(1, CONTROL_PERIOD_NS // simulator.period_ns)
         end_ns = simulator.time_ns + round(_VENTING * 1e9)
 

@@ -11,20 +11,16 @@ import os
 import sys
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.node import Node
 
-from ros_pad.contact.resistance import Foot
+from ros_pad.bags import topics
 from ros_pad.errors import InvalidInput, PadError
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation import doubt as doubts
 from ros_pad.estimation.stage import PUBLISH_RATE, EstimationStage
 from ros_pad.estimation.tuning import attribute
-from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import Diagnostics
-from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, Parameter, declare
+from ros_pad.nodes.base import PadNode
+from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, Parameter
 from ros_pad.nodes.process import run
 from ros_pad.pace import TICK_PERIOD_NS, Pace
 from ros_pad.records import Block
@@ -47,31 +43,22 @@ KEEP_PERIOD_NS = 10_000_000_000
 """Time between two savings of what was learnt, ns."""
 
 
-class EstimatorNode(Node):
+class EstimatorNode(PadNode):
     """Estimate slip, friction and wetness under each foot; parameters are in :data:`PARAMETERS`.
 
     Attributes
     ----------
     stage : EstimationStage
-    messages : Messages
-        Publishers and subscriptions.
     """
 
-    _learnt = ''  # until the parameters are declared
+    _kept: Any = None  # settings that were learnt and are in the file
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__(
-            'estimator', automatically_declare_parameters_from_overrides=True, **kwargs
-        )
-        self._begin_with_learnt()
-        values = declare(self, PARAMETERS)
-        self._foot: Foot = values['foot']
-        self._learnt = values['learnt']
+        super().__init__('estimator', PARAMETERS, **kwargs)
+        values, self._legs = self.values, self.values['legs']
         tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
-        self._legs: list[int] = values['legs']
-        self.messages = messages = Messages(self)
         self.stage = EstimationStage(
-            self._foot,
+            values['foot'],
             values['expected_load'],
             tuning,
             self._legs,
@@ -79,65 +66,57 @@ class EstimatorNode(Node):
             self._warn,
         )
         self._kept = learnt.settings_of(self.stage.estimator.shared)
-        self._send = messages.record_output(topics.ESTIMATE, self._legs)
-        self._diagnostics = Diagnostics(self, messages)
-        self._keep_pace = Pace(KEEP_PERIOD_NS)
-        self._health_pace = Pace(TICK_PERIOD_NS)
-        messages.receive_record(topics.SAMPLE, self._legs, self._on_samples)
-        messages.receive_record(topics.PRESSURE, self._legs, self._on_pressure)
-        messages.on_tick(TICK_PERIOD_NS * 1e-9, self._idle)
+        self._send = self.record_output(topics.ESTIMATE, self._legs)
+        self._keep_pace, self._health_pace = Pace(KEEP_PERIOD_NS), Pace(TICK_PERIOD_NS)
+        self.receive_record(topics.SAMPLE, self._legs, self._on_samples)
+        self.receive_record(
+            topics.PRESSURE, self._legs, lambda block: self.stage.pressure(block.rows[-1])
+        )
+        self.on_tick(self._idle)
 
     def _on_samples(self, block: Block) -> None:
-        if self.messages.simulated:
-            self.messages.advance(block.last_ns)
-            self._tick(block.last_ns)
+        self.advance(block.last_ns, self._tick)
         for estimate in self.stage.process(block):
             self._send(estimate)
-
-    def _on_pressure(self, block: Block) -> None:
-        self.stage.pressure(block.rows[-1])
 
     def _warn(self, leg: int, error: InvalidInput) -> None:
         self.get_logger().warning(f'leg {leg}: sample ignored: {error}', throttle_duration_sec=1.0)
 
-    def _begin_with_learnt(self) -> None:
-        """Declare what was learnt in earlier trials, if there is a file of it."""
-
-        def given(name: str, default: str) -> str:
-            return str(self.get_parameter(name).value if self.has_parameter(name) else default)
-
-        path = given('learnt', '')
-        if not path or not os.path.exists(path):
+    def prepare(self) -> None:
+        """Begin with what was learnt in earlier trials, if there is a file of it."""
+        given = {'learnt': '', 'foot': FOOT.default}
+        for name in given:
+            if self.has_parameter(name):
+                given[name] = str(self.get_parameter(name).value)
+        if not given['learnt'] or not os.path.exists(given['learnt']):
             return
-        known = learnt.load(path, given('foot', FOOT.default))
-        for name, value in known.items():
+        for name, value in learnt.load(given['learnt'], given['foot']).items():
             if self.has_parameter(name):
                 self.undeclare_parameter(name)
             self.declare_parameter(name, value, ignore_override=True)
 
     def keep_learnt(self) -> None:
         """Write what feet have learnt of friction, if it is new and there is a file for it."""
-        if (
-            not self._learnt
-            or (settings := learnt.settings_of(self.stage.estimator.shared)) == self._kept
-        ):
+        path, settings = self.values['learnt'], learnt.settings_of(self.stage.estimator.shared)
+        if not path or settings == self._kept:
             return
         try:
-            learnt.save(self._learnt, settings, self._foot)
+            learnt.save(path, settings, self.values['foot'])
             self._kept = settings
         except PadError as error:
             self.get_logger().warning(f'parameter learnt: {error}', throttle_duration_sec=60.0)
 
     def destroy_node(self) -> None:
         """Write what was learnt, and destroy the node."""
-        self.keep_learnt()
+        if self._kept is not None:
+            self.keep_learnt()
         super().destroy_node()
 
     def _idle(self, now_ns: int) -> None:
         """Tick without samples: the controller has to know of a foot whose sensors are silent."""
-        before = self._diagnostics.reported
+        before = self.reported
         self._tick(now_ns)
-        if self._diagnostics.reported != before:
+        if self.reported != before:
             self._send(self.stage.estimate(now_ns))
 
     def _tick(self, now_ns: int) -> None:
@@ -147,32 +126,27 @@ class EstimatorNode(Node):
         if self._keep_pace.due(now_ns):
             self.keep_learnt()
         rows = self.stage.estimate(now_ns).rows[0]
-        sound = [not doubts.is_fault(code) for code in rows['doubt'].tolist()]
-        if self._diagnostics.due(now_ns, sound):
-            statuses = [*self._statuses(rows, sound), self._learnt_status()]
-            if not self.messages.simulated:
-                stage = self.stage
-                statuses.append(self._diagnostics.rate(now_ns, stage.samples, stage.last_ns))
-            self._diagnostics.send(now_ns, statuses)
+        healthy = [not doubts.is_fault(code) for code in rows['doubt'].tolist()]
+        if self.due(now_ns, healthy):
+            numbers = range(len(rows))
+            feet = [self._foot(*each) for each in zip(numbers, rows, healthy, strict=True)]
+            rate = self.rate(now_ns, self.stage.samples, self.stage.last_ns)
+            self.report(now_ns, [*feet, self._learnt_status(), *rate])
 
-    def _statuses(self, rows: np.ndarray, sound: list[bool]) -> list[DiagnosticStatus]:
-        """Return the health of the sensors of each leg, and its estimate, for ``/diagnostics``."""
-        found = []
-        for index, (leg, row) in enumerate(zip(self._legs, rows, strict=True)):
-            noise = self.stage.estimator.tracks[index].watch.noise
-            values = {
-                'P(wet)': f'{row["wetness"]:.3f}',
-                'friction': f'{row["friction"]:.3f}',
-                'friction sd': f'{row["friction_sd"]:.3f}',
-                'position noise': noise.position.text('m'),
-                'force noise': noise.force.text('N'),
-                'samples': self.stage.used[index],
-            }
-            level = Diagnostics.OK if sound[index] else Diagnostics.ERROR
-            text = doubts.text(row['doubt'], *row['detail']) or 'the ground is observable'
-            name = f'leg {leg} sensing'
-            found.append(self._diagnostics.status(name, level, text, values, f'foot {leg}'))
-        return found
+    def _foot(self, index: int, row: Any, healthy: bool) -> DiagnosticStatus:
+        """Return the health of the sensors of a foot, and its estimate, for ``/diagnostics``."""
+        leg, noise = self._legs[index], self.stage.estimator.tracks[index].watch.noise
+        values = {
+            'P(wet)': f'{row["wetness"]:.3f}',
+            'friction': f'{row["friction"]:.3f}',
+            'friction sd': f'{row["friction_sd"]:.3f}',
+            'position noise': noise.position.text('m'),
+            'force noise': noise.force.text('N'),
+            'samples': self.stage.used[index],
+        }
+        text = doubts.text(row['doubt'], *row['detail']) or 'the ground is observable'
+        level = self.OK if healthy else self.ERROR
+        return self.status(f'leg {leg} sensing', level, text, values, f'foot {leg}')
 
     def _learnt_status(self) -> DiagnosticStatus:
         """Return the scales of friction with their intervals, for ``/diagnostics``."""
@@ -181,15 +155,8 @@ class EstimatorNode(Node):
             low, high = scale.interval
             values[name] = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
         text = 'friction over that of the contact model, with the interval of 95 %'
-        return self._diagnostics.status(
-            'friction of the floor', Diagnostics.OK, text, values, 'feet'
-        )
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until it is interrupted; return the exit status."""
-    return run(EstimatorNode, args)
+        return self.status('friction of the floor', self.OK, text, values, 'feet')
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(run(EstimatorNode))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -15,8 +14,8 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
-from ros_pad.errors import ConfigError
 from ros_pad.nodes.intake import Intake
+from ros_pad.nodes.qos import message_class
 from ros_pad.pace import Progress
 from ros_pad.sensing.mapping import Source
 
@@ -25,25 +24,6 @@ _PERIOD = 0.02  # s, between two looks at what has arrived
 _QOS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST, depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT
 )
-
-
-def message_class(type_name: str) -> Any:
-    """Return the class of a message type such as ``sensor_msgs/msg/Imu``.
-
-    Raises
-    ------
-    ConfigError
-        When its package is not installed.
-    """
-    package, _, name = type_name.partition('/msg/')
-    try:
-        return getattr(importlib.import_module(f'{package}.msg'), name)
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(
-            f'message type {type_name} is not installed ({error}): build the message package'
-            f' {package} with colcon, and source its workspace until'
-            f' `ros2 interface show {type_name}` shows it; a bag needs no package'
-        ) from error
 
 
 def receive(
@@ -86,7 +66,7 @@ def receive(
         for source in sources:
             name = node.resolve_topic_name(source.topic)
             names[name] = source
-            intake.add(name, classes[source.type_name], lambda _: _QOS)
+            intake.add(name, classes[source.type_name], _QOS)
         start = time.monotonic()
         while (passed := time.monotonic() - start) < seconds:
             time.sleep(_PERIOD)
@@ -108,4 +88,4 @@ def receive(
     return messages, topics
 
 
-__all__ = ['message_class', 'receive']
+__all__ = ['receive']

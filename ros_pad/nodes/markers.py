@@ -5,21 +5,20 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ros_pad.bags.codec import message_type
-from ros_pad.bags.definitions import message_definition
 from ros_pad.contact.pad import DOME_PRESSURE
+from ros_pad.pace import Pace
+from ros_pad.records import split
 from ros_pad.simulation.robot import FootState, SimulatedRobot
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
 
-ARRAY = message_type(
-    'visualization_msgs/msg/MarkerArray', message_definition('visualization_msgs/msg/MarkerArray')
-)
+ARRAY = message_type('visualization_msgs/msg/MarkerArray')
 """Type of the messages. Classes of rclpy check each number, and take ten times as long."""
 
 _MARKER = ARRAY.blank('visualization_msgs/msg/Marker')
@@ -30,12 +29,10 @@ Quaternion, ColorRGBA = type(_MARKER.pose.orientation), type(_MARKER.color)
 FORCE_SCALE = 0.01
 """Length of an arrow for one newton, m."""
 
-TILE = 1.0
-"""Edge of the square of floor in one marker, m."""
+CELL = 0.05
+"""Edge of a square of floor that is drawn wet or dry, m."""
 
-_CELLS = 20  # cells along one side of a tile
-_SIGHT = 1.5  # distance ahead of and behind the body up to which floor is shown, m
-_BREADTH = 0.6  # the same to the left and to the right, m
+_SIGHT, _BREADTH = 1.5, 0.6  # floor is shown so far ahead of and behind the body, and beside it, m
 _SLOW_NS = 1_000_000_000  # floor and path are large messages: once a second is enough
 _PATH_STEP = 0.02  # smallest distance between points of the path, m
 
@@ -66,16 +63,14 @@ class WalkMarkers:
     def __init__(self, scene: Scene, floor: Floor) -> None:
         self._scene = scene
         self._floor = floor
-        self._tiles: dict[tuple[int, int], Any] = {}
         self._path: list[Any] = []
-        self._slow_ns: int | None = None
+        self._slow_pace = Pace(_SLOW_NS)
         outline: Sequence[tuple[float, float]] = ()
         if isinstance(scene.body, LeggedBody):
             around = sorted(scene.body.homes, key=lambda home: math.atan2(home[1], -home[0]))
             outline = (*around, around[0])
         # The outline of the body is drawn halfway to the home positions of the feet.
         self._outline = [(0.5 * x, 0.5 * y) for x, y in outline]
-        list(self._ground(0.0, 0.0))  # in advance, because it would delay the walk
 
     def message(self, robot: SimulatedRobot, pressures: Sequence[float], time_ns: int) -> Any:
         """Return the markers of this moment.
@@ -89,7 +84,7 @@ class WalkMarkers:
         time_ns : int
             Time stamp of the markers, ns.
         """
-        seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
+        seconds, nanoseconds = split(time_ns)
         stamp = Time(sec=seconds, nanosec=nanoseconds)
         array = ARRAY.blank()
         for leg, foot, pressure in zip(robot.legs, robot.feet, pressures, strict=True):
@@ -99,10 +94,9 @@ class WalkMarkers:
         array.markers.append(self._body(x, y, heading))
         if not self._path or math.dist((self._path[-1].x, self._path[-1].y), (x, y)) > _PATH_STEP:
             self._path.append(Point(x=x, y=y, z=0.002))
-        if self._slow_ns is None or not 0 <= time_ns - self._slow_ns < _SLOW_NS:
-            self._slow_ns = time_ns
+        if self._slow_pace.due(time_ns):
             array.markers.append(self._line('path', self._path, _BLACK, 0.006))
-            array.markers.extend(self._ground(x, y))
+            array.markers.append(self._ground(x, y))
         for marker in array.markers:
             marker.header.stamp = stamp
         return array
@@ -153,32 +147,21 @@ class WalkMarkers:
         marker.color = _colour(colour)
         return marker
 
-    def _ground(self, x: float, y: float) -> Iterator[Any]:
-        """Yield the wet floor around the body, square by square."""
-        for column in range(math.floor((x - _SIGHT) / TILE), math.floor((x + _SIGHT) / TILE) + 1):
-            for row in range(
-                math.floor((y - _BREADTH) / TILE), math.floor((y + _BREADTH) / TILE) + 1
-            ):
-                if (column, row) not in self._tiles:
-                    self._tiles[column, row] = self._tile(column, row)
-                if self._tiles[column, row].points:
-                    yield self._tiles[column, row]
-
-    def _tile(self, column: int, row: int) -> Any:
-        number = column * 1000 + row  # unique over a kilometre of floor
-        marker = _marker('wet ground', number, _MARKER.TRIANGLE_LIST)
-        cell = TILE / _CELLS
-        centres = (np.arange(_CELLS) + 0.5) * cell
-        wet = self._floor.wet_along(*np.meshgrid(column * TILE + centres, row * TILE + centres))
-        for left, right, bottom, top in _rectangles(wet):
-            x0, x1 = column * TILE + left * cell, column * TILE + right * cell
-            y0, y1 = row * TILE + bottom * cell, row * TILE + top * cell
-            a, b, c, d = (
-                Point(x=x, y=y, z=0.0) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
-            )
-            marker.points += [a, b, c, a, c, d]
-        marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
+    def _ground(self, x: float, y: float) -> Any:
+        """Return the wet floor around the body, square by square."""
+        columns, rows = round(2.0 * _SIGHT / CELL), round(2.0 * _BREADTH / CELL)
+        first = math.floor((x - _SIGHT) / CELL), math.floor((y - _BREADTH) / CELL)
+        xs = (first[0] + np.arange(columns) + 0.5) * CELL
+        ys = (first[1] + np.arange(rows) + 0.5) * CELL
+        across, along = np.meshgrid(xs, ys)
+        wet = self._floor.wet_along(across, along)
+        marker = _marker('wet ground', 0, _MARKER.CUBE_LIST)
+        places = zip(across[wet].tolist(), along[wet].tolist(), strict=True)
+        marker.points = [Point(x=left, y=fore, z=0.0) for left, fore in places]
+        marker.scale = Vector3(x=CELL, y=CELL, z=0.001)
         marker.color = _colour(_WET, 0.5)
+        if not marker.points:
+            marker.action = _MARKER.DELETE
         return marker
 
 
@@ -191,23 +174,6 @@ def marker_of_foot(leg: int, x: float, y: float, wetness: float) -> Any:
     red, green, blue = (d + share * (w - d) for d, w in zip(_DRY, _WET, strict=True))
     marker.color = _colour(_SWING if math.isnan(wetness) else (red, green, blue))
     return marker
-
-
-def _rectangles(wet: np.ndarray) -> Iterator[tuple[int, int, int, int]]:
-    """Yield rectangles (left, right, bottom, top) that together are the wet cells.
-
-    Runs of wet cells in a row are merged with equal runs in the next rows, which gives a tenth of
-    the corners of single cells.
-    """
-    growing: dict[tuple[int, int], int] = {}  # first row of each run
-    for row in range(len(wet) + 1):
-        cells = wet[row].astype(int) if row < len(wet) else []
-        edges = np.flatnonzero(np.diff(cells, prepend=0, append=0)).tolist()
-        runs = set(zip(edges[::2], edges[1::2], strict=True))
-        for left, right in sorted(growing.keys() - runs):
-            yield left, right, growing.pop((left, right)), row
-        for run in runs:
-            growing.setdefault(run, row)
 
 
 def _marker(name: str, number: int, kind: int) -> Any:

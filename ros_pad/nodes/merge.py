@@ -8,26 +8,24 @@ record that somebody else publishes is not published here: two sources would con
 
 from __future__ import annotations
 
+import re
 import sys
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from rclpy.node import Node
 
-from ros_pad.bags import topics as schemas
-from ros_pad.bags.topics import FRAME, STAMP
-from ros_pad.errors import InvalidInput
+from ros_pad.bags import topics
+from ros_pad.bags.topics import FRAME, STAMP, Topic
+from ros_pad.errors import BadMessage
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.joining import WAIT_NS, Joiner
-from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import Diagnostics
-from ros_pad.nodes.frames import check_frame
-from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, declare
+from ros_pad.nodes.base import PadNode
+from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
 from ros_pad.nodes.process import run
-from ros_pad.records import COMMAND, PRESSURE, SAMPLE, Block
+from ros_pad.records import Block
 
 PARAMETERS = (
     LEGS,
@@ -40,56 +38,51 @@ PARAMETERS = (
         'topics', 'wrench, position, foot_wrench, pressure',
         'Topics of each leg that are joined, with commas between them; also contact_velocity and'
         ' pressure_setpoint.',
-        read=lambda text: topics.chosen(text, schemas.FROM_DRIVERS),
+        read=chosen(topics.FROM_DRIVERS),
     ),
 )  # fmt: skip
 
 
-class MergeNode(Node):
+_OF_A_LEG = re.compile(r'(?:.*/)?leg_(\d+)_', re.DOTALL)
+
+
+class MergeNode(PadNode):
     """Join messages of single legs into records; parameters are in :data:`PARAMETERS`.
 
     Attributes
     ----------
-    messages : Messages
-        Publishers and subscriptions.
-    refused : dict of str to int
+    contested : Counter of str
         Records that were not published because others publish them, by topic.
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__('merge', automatically_declare_parameters_from_overrides=True, **kwargs)
-        values = declare(self, PARAMETERS)
-        self._legs, self._ambient = values['legs'], values['ambient_pressure']
-        self.messages = messages = Messages(self)
-        self.refused: dict[str, int] = {}
-        needed = ('force', 'position') + (('velocity',) if values['source'] == 'joints' else ())
-        self._records = {
-            topic.name(): _Record(self, topic, Joiner(kind, self._legs, fields))
-            for topic, kind, fields in (
-                (topics.SAMPLE, SAMPLE, needed),
-                (topics.FORCE, SAMPLE, ('force',)),
-                (topics.PRESSURE, PRESSURE, ()),
-                (topics.COMMAND, COMMAND, ()),
-            )
-        }
-        for schema in values['topics']:
-            assert schema.record
-            name = 'force' if schema is schemas.LEG_FOOT_WRENCH else schema.record.name
-            record, topic = self._records[f'feet/{name}'], topics.of_leg(schema)
-            for leg in self._legs:
-                messages.receive(
-                    topic,
-                    partial(self._take, record, schema, leg),
-                    (FRAME, *STAMP, *schema.values),
-                    leg,
-                )
-        self._diagnostics = Diagnostics(self, messages)
-        messages.on_tick(WAIT_NS * 1e-9, self._tick, every=True)
+        super().__init__('merge', PARAMETERS, **kwargs)
+        legs, self.contested = self.values['legs'], Counter[str]()
+        needed = ('force', 'position', 'velocity')[: 3 if self.values['source'] == 'joints' else 2]
+        self._joiners: dict[Topic, Joiner] = {}
+        for topic, fields in (
+            (topics.SAMPLE, needed),
+            (topics.FORCE, ('force',)),
+            (topics.PRESSURE, ()),
+            (topics.COMMAND, ()),
+        ):
+            assert topic.record
+            self._joiners[topic] = Joiner(topic.record, legs, fields)
+        # A publisher is made with the first record.
+        self._outputs: dict[Topic, Callable[[Block], None]] = {}
+        for topic in self.values['topics']:
+            joined = topics.FORCE
+            if topic is not topics.LEG_FOOT_WRENCH:
+                joined = next(each for each in topics.RECORDS if each.record is topic.record)
+            for leg in legs:
+                take = partial(self._take, joined, topic, leg)
+                self.receive(topic, take, (FRAME, *STAMP, *topic.values), leg)
+        self.on_tick(self._tick, WAIT_NS * 1e-9, all_steps=True)
 
     def _take(
         self,
-        record: _Record,
-        schema: schemas.Topic,
+        joined: Topic,
+        topic: Topic,
         leg: int,
         frame: str,
         seconds: int,
@@ -97,67 +90,38 @@ class MergeNode(Node):
         *values: float,
     ) -> None:
         """Process a message of a leg."""
-        try:
-            check_frame(frame, leg)
-        except InvalidInput as error:
-            self.messages.refusals(self.resolve_topic_name(schema.name(leg)), error)
+        named = _OF_A_LEG.match(frame)
+        if named and named[1] != str(leg):  # two cables or topics may be swapped
+            error = BadMessage(f'frame_id = {frame[:80]!r} is that of another leg')
+            self.refuse(self.resolve_topic_name(topic.name(leg)), error)
             return
-        stamp_ns = seconds * 1_000_000_000 + fraction or self.messages.now_ns()
-        numbers = schemas.to_record(schema, np.array(values), self._ambient)
-        record.add(leg, stamp_ns, dict(zip(schema.columns, numbers.tolist(), strict=True)))
+        stamp_ns = seconds * 1_000_000_000 + fraction or self.now_ns()
+        numbers = topics.to_record(topic, np.array(values), self.values['ambient_pressure'])
+        piece = dict(zip(topic.columns, numbers.tolist(), strict=True))
+        self._send(joined, self._joiners[joined].add(leg, stamp_ns, piece))
 
-    def _tick(self, now_ns: int) -> None:
-        for record in self._records.values():
-            record.expire(now_ns)
-        if self._diagnostics.due(now_ns):
-            self._diagnose(now_ns)
-
-    def _diagnose(self, now_ns: int) -> None:
-        statuses = []
-        if self.refused:
-            text = 'others publish records too: those of this node are refused'
-            statuses.append(
-                self._diagnostics.status('records', Diagnostics.ERROR, text, self.refused)
-            )
-        if statuses or self.messages.refusals.counts:
-            self._diagnostics.send(now_ns, statuses)
-
-
-class _Record:
-    """A record that is joined, and its publisher, which is made with the first piece."""
-
-    def __init__(self, node: MergeNode, topic: topics.Topic, joiner: Joiner) -> None:
-        self._node, self._topic, self._joiner = node, topic, joiner
-        self._publish: Callable[[Block], None] | None = None
-
-    def add(self, leg: int, stamp_ns: int, values: dict[str, float]) -> None:
-        """Add what a message of a leg has: numbers of the record, by column."""
-        self._send(self._joiner.add(leg, stamp_ns, values))
-
-    def expire(self, now_ns: int) -> None:
-        """Publish what has waited too long."""
-        self._send(self._joiner.expire(now_ns))
-
-    def _send(self, blocks: list[Block]) -> None:
+    def _send(self, topic: Topic, blocks: list[Block]) -> None:
         for block in blocks:
-            node, name = self._node, self._topic.name()
-            if node.count_publishers(name) > (self._publish is not None):
-                node.refused[name] = node.refused.get(name, 0) + 1
-                node.get_logger().error(
+            name = topic.name()
+            if self.count_publishers(name) > (topic in self._outputs):
+                self.contested[name] += 1
+                self.get_logger().error(
                     f'{name}: somebody else publishes it: what drivers publish by leg is refused',
                     throttle_duration_sec=10.0,
                 )
                 continue
-            if self._publish is None:
-                legs = node.get_parameter('legs').value
-                self._publish = node.messages.record_output(self._topic, legs)
-            self._publish(block)
+            if topic not in self._outputs:
+                self._outputs[topic] = self.record_output(topic, self.values['legs'])
+            self._outputs[topic](block)
 
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until it is interrupted; return the exit status."""
-    return run(MergeNode, args)
+    def _tick(self, now_ns: int) -> None:
+        for topic, joiner in self._joiners.items():
+            self._send(topic, joiner.expire(now_ns))
+        if self.due(now_ns) and (self.contested or self.refused):
+            text = 'others publish records too: those of this node are refused'
+            statuses = [self.status('records', self.ERROR, text, self.contested)]
+            self.report(now_ns, statuses if self.contested else [])
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(run(MergeNode))

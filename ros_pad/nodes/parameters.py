@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of nodes: a table for each node, from which descriptors, YAML and docs are made."""
+"""Parameters of nodes: a table for each node, from which descriptors and YAML are made."""
 
 from __future__ import annotations
 
@@ -19,16 +19,19 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from ros_pad.configuration import Setting
+from ros_pad.bags.topics import Topic
+from ros_pad.configuration import Setting, choice
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError, InvalidInput, PadError
 from ros_pad.estimation import tuning
-from ros_pad.nodes import topics
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import label
 
 BACKEND_OPTIONS = 'backend_options'
 """Prefix of the regulator's parameters that are options of its backend."""
+
+MOST_LEGS = 8
+"""Largest number of a leg."""
 
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
@@ -43,19 +46,10 @@ class Parameter(Setting):
         Converts the value to what the node works with; raises `PadError` if it cannot.
     live : bool
         Whether it can be changed while the node runs; all others are read-only.
-    change : callable or None
-        Called after a change with the node and the new value.
     """
 
     read: Callable[[Any], Any] | None = None
     live: bool = False
-    change: Callable[[Any, Any], None] | None = None
-
-    @property
-    def kind(self) -> str:
-        """The name of the type in ROS tools."""
-        kinds = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
-        return kinds.get(self.value_type, 'integer array')
 
     def descriptor(self) -> ParameterDescriptor:
         """Return the descriptor that ROS tools show."""
@@ -76,9 +70,7 @@ class Parameter(Setting):
         return descriptor
 
 
-LEGS = Parameter(
-    'legs', list(topics.LEGS), 'Numbers of the legs of this node.', '', 1, topics.MOST_LEGS
-)
+LEGS = Parameter('legs', [1, 2, 3, 4, 5, 6], 'Numbers of the legs of this node.', '', 1, MOST_LEGS)
 FOOT = Parameter(
     'foot', 'large37', 'Name of a foot in config/feet, or path of a YAML file.', read=Foot.load
 )
@@ -96,16 +88,14 @@ AMBIENT_PRESSURE = Parameter(**vars(label.AMBIENT_PRESSURE))
 def declare(
     node: Node,
     table: Sequence[Parameter],
-    together: Callable[[Mapping[str, Any]], object] | None = None,
+    apply: Callable[[Mapping[str, Any]], None],
 ) -> dict[str, Any]:
     """Declare a table of parameters and return their values by name.
 
-    A node made with ``automatically_declare_parameters_from_overrides`` also refuses a name that
-    looks misspelt, and warns of other unknown names.
+    A name that looks misspelt is refused, other unknown names are warned of.
 
     Later changes of live parameters are checked, and update the returned mapping when they are
-    accepted. Changes of the other parameters of the table and of ``use_sim_time`` are refused with
-    the reason.
+    accepted. Changes of the other parameters and of ``use_sim_time`` are refused.
 
     Parameters
     ----------
@@ -113,9 +103,9 @@ def declare(
         Node to declare them on.
     table : sequence of Parameter
         Parameters of the node.
-    together : callable or None
-        Called with the values, now and before each change; raises `PadError` if values are not
-        allowed together.
+    apply : callable
+        Called with all values when some have changed; raises `PadError`, and changes nothing, if
+        they are not allowed together.
 
     Raises
     ------
@@ -134,16 +124,33 @@ def declare(
             )
         given = node.get_parameter(name).value
         node.undeclare_parameter(name)
-        value, values[name] = _checked(node, parameter, given)
+        try:
+            value, values[name] = _checked(parameter, given)
+        except ConfigError as error:
+            raise ConfigError(f'node {node.get_name()}: {error}') from error
         node.declare_parameter(name, value, parameter.descriptor(), ignore_override=True)
     _refuse_misspelt(node, [parameter.name for parameter in table])
     live = {parameter.name: parameter for parameter in table if parameter.live}
-    if together:
+    simulated = node.get_parameter('use_sim_time').value
+
+    def check(changes: list[RosParameter]) -> SetParametersResult:
         try:
-            together(values)
+            if any(each.name == 'use_sim_time' and each.value != simulated for each in changes):
+                # A node that waits for a missing /clock would not vent.
+                raise ConfigError('parameter use_sim_time is read only at the start of the node')
+            changed = {
+                each.name: _checked(live[each.name], each.value)[1]
+                for each in changes
+                if each.name in live
+            }
+            if changed:
+                apply(values | changed)
         except PadError as error:
-            raise ConfigError(f'node {node.get_name()}: {error}') from error
-    _follow(node, live, values, together)
+            return SetParametersResult(reason=f'node {node.get_name()}: {error}')
+        values.update(changed)
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(check)
     return values
 
 
@@ -165,70 +172,17 @@ def _refuse_misspelt(node: Node, known: Sequence[str]) -> None:
             node.get_logger().warning(f'there is no parameter {name!r}: it is ignored')
 
 
-def _checked(node: Node, parameter: Parameter, given: Any) -> tuple[Any, Any]:
+def _checked(parameter: Parameter, given: Any) -> tuple[Any, Any]:
     """Return a value as the parameter's type, and the value that the node works with."""
-    where = f'node {node.get_name()}: parameter '
     try:
-        value = parameter.accept(given.tolist() if isinstance(given, array) else given)
+        value = parameter.accept(plain(given))
     except InvalidInput as error:
-        raise ConfigError(f'{where}{error}') from None
+        raise ConfigError(f'parameter {error}') from None
     try:
         return value, parameter.read(value) if parameter.read else value
     except PadError as error:
-        where += f'{parameter.name} = {value!r}'
-        raise ConfigError(f'{where} is not allowed: {error}') from error
-
-
-def _follow(
-    node: Node,
-    live: dict[str, Parameter],
-    values: dict[str, Any],
-    together: Callable[[Mapping[str, Any]], object] | None,
-) -> None:
-    """Accept changes of live parameters; ROS itself refuses changes of read-only ones."""
-
-    def prepare(changes: list[RosParameter]) -> list[RosParameter]:
-        # A whole number is accepted for a double, as at the start.
-        return [
-            RosParameter(each.name, value=float(each.value))
-            if each.name in live and type(each.value) is int and live[each.name].kind == 'double'
-            else each
-            for each in changes
-        ]
-
-    def check(changes: list[RosParameter]) -> SetParametersResult:
-        changed = dict(values)
-        for each in changes:
-            if each.name == 'use_sim_time' and each.value != node.get_parameter(each.name).value:
-                # A node that waits for a missing /clock would not vent.
-                return SetParametersResult(
-                    reason=f'node {node.get_name()}: parameter use_sim_time is read only at the'
-                    ' start of the node'
-                )
-            if each.name in live:
-                try:
-                    _, changed[each.name] = _checked(node, live[each.name], each.value)
-                except ConfigError as error:
-                    return SetParametersResult(reason=str(error))
-        try:
-            if together:
-                together(changed)
-        except PadError as error:
-            return SetParametersResult(reason=f'node {node.get_name()}: {error}')
-        return SetParametersResult(successful=True)
-
-    def apply(changes: list[RosParameter]) -> None:
-        changed = [each for each in changes if each.name in live]
-        for each in changed:
-            _, values[each.name] = _checked(node, live[each.name], each.value)
-        for each in changed:  # only now: some values are allowed only together
-            change = live[each.name].change
-            if change:
-                change(node, values[each.name])
-
-    node.add_pre_set_parameters_callback(prepare)
-    node.add_on_set_parameters_callback(check)
-    node.add_post_set_parameters_callback(apply)
+        name = parameter.name
+        raise ConfigError(f'parameter {name} = {value!r} is not allowed: {error}') from error
 
 
 def plain(value: Any) -> Any:
@@ -243,5 +197,15 @@ def plain(value: Any) -> Any:
 def values_of(node: Node) -> dict[str, Any]:
     """Return every parameter of a node by name, in a form that JSON can express."""
     names = sorted(node.get_parameters_by_prefix(''))
-    values = [each.value for each in node.get_parameters(names)]
-    return {name: plain(value) for name, value in zip(names, values, strict=True)}
+    return {each.name: plain(each.value) for each in node.get_parameters(names)}
+
+
+def chosen(known: Sequence[Topic]) -> Callable[[str], list[Topic]]:
+    """Return a function that returns the topics of a leg that a text names, with commas."""
+    kinds = {topic.kind: topic for topic in known}
+
+    def read(text: str) -> list[Topic]:
+        names = [each.strip() for each in text.split(',') if each.strip()]
+        return [kinds[choice('topic of a leg', name, tuple(kinds))] for name in names]
+
+    return read

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 import json
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -17,22 +17,20 @@ from typing import Any
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.client import Client
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events
+from rclpy.qos import qos_profile_parameter_events
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
-from ros_pad.bags import BagWriter
+from ros_pad.bags import BagWriter, topics
+from ros_pad.bags.topics import Topic
 from ros_pad.bags.wire import Wire
 from ros_pad.bags.writer import FLUSH_PERIOD
 from ros_pad.errors import BadMessage, BagError
-from ros_pad.nodes import qos, topics
-from ros_pad.nodes.diagnostics import Diagnostics
+from ros_pad.nodes import qos
+from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.intake import Intake
-from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import LEGS, Parameter, declare, plain
+from ros_pad.nodes.parameters import LEGS, Parameter, plain
 from ros_pad.nodes.process import run
 from ros_pad.pace import LATE
 from ros_pad.trials import label
@@ -51,32 +49,14 @@ PARAMETERS = (
     ),
 )
 
-
-_Write = Callable[[bytes, int], None]
-
 _STAMPS = [struct.Struct(order + '4xiI') for order in '><']  # by the byte order of a message
 
 INTAKE_PERIOD = 0.1
 """Time after which received messages are written, s; the middleware keeps them until then."""
 
 
-@dataclasses.dataclass
-class _Peer:
-    """A node of the robot, and the state of the requests for its parameters."""
-
-    clients: tuple[Client, Client] | None  # list and get parameters; None where that is forbidden
-    publishers: set[bytes] = dataclasses.field(default_factory=set)  # of its parameter events
-    looks: int = 0  # calls of due() since the node appeared or restarted
-    answered: bool = False
-
-    def due(self) -> bool:
-        """Count a call; return True at calls 1, 2, 4, 8 and so on, to spare a slow node."""
-        self.looks += 1
-        return self.looks & (self.looks - 1) == 0
-
-
-class RecorderNode(Node):
-    """Write every topic of `ros_pad.nodes.topics`, latched ones too, into a new bag.
+class RecorderNode(PadNode):
+    """Write every topic of `ros_pad.bags.topics.RECORDED`, latched ones too, into a new bag.
 
     Messages are written without decoding, so that tens of thousands a second can be recorded; of
     a block of records each is written alone. Their log time is the time of receipt; with
@@ -106,53 +86,38 @@ class RecorderNode(Node):
         When the value of a parameter is not allowed.
     """
 
-    def __init__(
-        self,
-        custom_data: Mapping[str, str] | None = None,
-        **kwargs: Any,
-    ) -> None:
-        super().__init__('recorder', **kwargs)
-        try:
-            values = declare(self, PARAMETERS)
-            folder = values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
-            recorded = topics.names()
-            self._reliable: bool = values['reliable']
-            self._simulated = self.get_parameter('use_sim_time').value
-            self._clock_ns = 0
-            about = dict(custom_data or {label.MADE_WITH: json.dumps(label.made_with())})
-            self._bag = BagWriter(folder, about)
-        except BaseException:
-            super().destroy_node()
-            raise
-        self._intake = Intake(self)
-        self._told = 0  # lost messages in the last message on /diagnostics
-        messages = Messages(self)
-        self._diagnostics, self._refusals = Diagnostics(self, messages), messages.refusals
+    _bag: BagWriter | None = None
+
+    def __init__(self, custom_data: Mapping[str, str] | None = None, **kwargs: Any) -> None:
+        super().__init__('recorder', PARAMETERS, **kwargs)
+        self._clock_ns = 0
         self._failed = False  # whether writing has failed
-        self._writers: dict[str, _Write] = {}  # by full name of the topic
-        for name, topic in recorded.items():
-            full_name = self.resolve_topic_name(name)
-            self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
-            self._writers[full_name] = self._writer(full_name, topic, values['legs'])
-            self._intake.add(full_name, topic.message, partial(self._profile, topic))
-        self._peers: dict[str, _Peer] = {}
-        self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
+        self._told = 0  # lost messages in the last message on /diagnostics
+        folder = self.values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
+        about = custom_data or {label.MADE_WITH: json.dumps(label.made_with())}
+        self._bag = BagWriter(folder, about)
+        self._intake = Intake(self)
+        self._topics: dict[str, tuple[Topic, Wire | None]] = {}  # by full name
+        for topic in topics.RECORDED:
+            name, wire = self.resolve_topic_name(topic.name()), None
+            if topic.record:
+                wire = Wire(topic.record, self.values['legs'])
+            self._topics[name] = topic, wire
+            self._bag.add_topic(name, topic.type_name, qos.offered(topic))
+            profile = qos.recording(topic, self.values['reliable'])
+            self._intake.add(name, qos.message_class(topic.type_name), profile)
+        self._collector: _Parameters | None = None
+        if custom_data is None:
+            self._collector = _Parameters(self, self._bag)
         # In wall time, independent of the clock of the trial.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(FLUSH_PERIOD, self._look, clock=steady)
-        self.create_timer(INTAKE_PERIOD, self._take, clock=steady)
-        self._collects_parameters = custom_data is None
-        self._changes: list[tuple[int, str, str, Any]] = []
-        if self._collects_parameters:
-            self.create_subscription(
-                ParameterEvent, '/parameter_events', self._on_change, qos_profile_parameter_events
-            )
-        self.get_logger().info(f'recording {len(recorded)} topics into {self._bag.folder}')
+        self.every(FLUSH_PERIOD, self._look)
+        self.every(INTAKE_PERIOD, self._take)
+        self.get_logger().info(f'recording {len(self._topics)} topics into {folder}')
 
     @property
     def message_count(self) -> int:
         """Number of messages recorded so far."""
-        return self._bag.message_count
+        return self._bag.message_count if self._bag else 0
 
     @property
     def lost(self) -> dict[str, int]:
@@ -160,14 +125,19 @@ class RecorderNode(Node):
         return dict(self._intake.lost)
 
     @property
+    def time_ns(self) -> int:
+        """Time of the trial, ns."""
+        return self._clock_ns if self.simulated else time.time_ns()
+
+    @property
     def subscriptions(self) -> Iterator[Subscription]:
         """Subscriptions whose messages an executor takes: not the recorded ones."""
-        recorded = self._intake.subscriptions if hasattr(self, '_intake') else []
+        recorded = list(self._intake.subscriptions.values())
         return (each for each in super().subscriptions if each not in recorded)
 
     def _take(self) -> None:
         try:
-            self._intake.take(lambda name, data, at_ns: self._writers[name](data, at_ns))
+            self._intake.take(self._write)
         except BagError:
             # Raise once only: later messages fail because the bag is closed.
             if not self._failed:
@@ -176,25 +146,24 @@ class RecorderNode(Node):
 
     def describe(self, custom_data: Mapping[str, str]) -> None:
         """Add custom data about the trial to the bag."""
-        self._bag.describe(custom_data)
+        if self._bag:
+            self._bag.describe(custom_data)
 
-    def close(self, custom_data: Mapping[str, str] | None = None) -> None:
+    def close(self) -> None:
         """Stop recording and close the bag.
-
-        Parameters
-        ----------
-        custom_data : mapping of str to str, optional
-            Added to the custom data of the bag.
 
         Raises
         ------
         BagError
             When the disk is full; it says how many messages are saved.
         """
+        if not self._bag:
+            return
         if not self._failed:
             self._take()
         self._intake.close()
-        self._bag.close({label.LOST: json.dumps(self.lost)} | dict(custom_data or {}))
+        self._bag.describe({label.LOST: json.dumps(self.lost)})
+        self._bag.close()
 
     def destroy_node(self) -> None:
         """Close the bag, if it is open, and the node; raise the same errors as :meth:`close`."""
@@ -203,174 +172,136 @@ class RecorderNode(Node):
         finally:
             super().destroy_node()
 
-    def _profile(self, topic: topics.Topic, offered: list[QoSProfile]) -> QoSProfile:
-        measured = topic.subscribe.reliability == ReliabilityPolicy.BEST_EFFORT
-        # Drivers of sensors may offer less than is requested: request less.
-        return qos.recording([topic.publish, *offered], measured and not self._reliable)
-
     def _look(self) -> None:
         """Flush the bag, also when no messages arrive, and request parameters of new nodes."""
-        if self._failed:
+        if self._failed or not self._bag:
             return
-        if self._collects_parameters:
-            self._look_for_nodes()
+        if self._collector:
+            self._collector.look()
         lost = self._intake.lost.total()
         if lost > self._told:
-            self.get_logger().warning(f'{lost} messages lost so far: see /diagnostics')
             self._told = lost
-            self._diagnose()
+            text = f'{LATE}: {lost} messages lost so far'
+            self.get_logger().warning(text)
+            self.report(self.now_ns(), [self.status('lost messages', self.WARN, text, self.lost)])
         try:
             self._bag.flush()
         except BagError:
             self._failed = True
             raise
 
-    def _diagnose(self) -> None:
-        """Tell on ``/diagnostics`` how many messages were lost."""
-        text = f'{LATE}: {self._told} messages lost so far'
-        status = self._diagnostics.status('lost messages', Diagnostics.WARN, text, self.lost)
-        self._diagnostics.send(self.get_clock().now().nanoseconds, [status])
+    def _write(self, name: str, data: bytes, at_ns: int) -> None:
+        """Write a message that was received at a time, ns."""
+        assert self._bag
+        topic, wire = self._topics[name]
+        records = [(at_ns, data)]
+        if wire:
+            try:
+                records = wire.split(data)
+            except BadMessage as error:
+                self.refuse(name, error)  # it is kept all the same
+        elif self.simulated and (topic.frame or topic is topics.CLOCK):
+            records = [(_stamp_of(data), data)]
+            if topic is topics.CLOCK:
+                self._clock_ns = max(0, records[0][0])
+        elif self.simulated:
+            records = [(self._clock_ns, data)]
+        late_ns = 0 if self.simulated else at_ns - records[-1][0]
+        for stamp_ns, record in records:
+            self._bag.write(name, record, max(0, stamp_ns + late_ns))  # a bag begins at 0
 
-    def _look_for_nodes(self) -> None:
-        """Request the parameters of every node of the robot when its services are there.
 
-        A request without a response is repeated, and a node that restarts gets a new request. A
-        killed node stays on the graph for a while: when it restarts before its name is removed,
-        only its publishers are new.
+class _Parameters:
+    """Parameters of the robot's nodes, which are requested for a bag as the nodes appear."""
+
+    def __init__(self, node: RecorderNode, bag: BagWriter) -> None:
+        self._node, self._bag = node, bag
+        self._clients: dict[str, tuple[Client, Client] | None] = {}  # by full name of the node
+        # A node publishes changes of its parameters: another publisher is a node that restarted.
+        self._looks: Counter[bytes] = Counter()
+        self._answered: set[bytes] = set()
+        self._values: dict[str, dict[str, Any]] = {}
+        self._changes: list[tuple[int, str, str, Any]] = []
+        node.create_subscription(
+            ParameterEvent, '/parameter_events', self._on_change, qos_profile_parameter_events
+        )
+
+    def look(self) -> None:
+        """Request the parameters of new nodes when their services are there.
+
+        A request without a response is repeated, ever more seldom, to spare a slow node.
         """
-        here = {
-            f'{namespace.rstrip("/")}/{name}'
-            for name, namespace in self.get_node_names_and_namespaces()
-            if namespace == self.get_namespace() and not name.startswith('_')
-        }
-        for node in self._peers.keys() - here:
-            for client in self._peers.pop(node).clients or ():
-                self.destroy_client(client)
-        publishers: dict[str, set[bytes]] = {}
-        for each in self.get_publishers_info_by_topic('/parameter_events'):
-            node = f'{each.node_namespace.rstrip("/")}/{each.node_name}'
-            publishers.setdefault(node, set()).add(bytes(each.endpoint_gid))
-        for node in here:
-            peer = self._peers.get(node)
-            if peer is None:
-                peer = self._peers[node] = _Peer(self._parameter_clients(node))
-            found = publishers.get(node, set())
-            if found - peer.publishers:
-                peer.answered, peer.looks = False, 0
-            peer.publishers = found
-            if peer.clients and not peer.answered:
-                ready = all(client.service_is_ready() for client in peer.clients)
-                if ready and peer.due():
-                    self._request_names(node, peer, *peer.clients)
+        namespace = self._node.get_namespace()
+        for each in self._node.get_publishers_info_by_topic('/parameter_events'):
+            name, publisher = each.node_name, bytes(each.endpoint_gid)
+            hidden = name.startswith('_')  # also that of a node whose name is not known yet
+            if hidden or publisher in self._answered or each.node_namespace != namespace:
+                continue
+            node = f'{namespace.rstrip("/")}/{name}'
+            if node not in self._clients:
+                self._clients[node] = self._made(node)
+            clients = self._clients[node]
+            if clients and all(client.service_is_ready() for client in clients):
+                self._looks[publisher] += 1
+                if self._looks[publisher].bit_count() == 1:  # 1, 2, 4, 8 and so on
+                    self._request(publisher, node, *clients)
 
-    def _parameter_clients(self, node: str) -> tuple[Client, Client] | None:
+    def _made(self, node: str) -> tuple[Client, Client] | None:
+        """Return clients of a node, which list its parameters and get them."""
         try:
-            lister = self.create_client(ListParameters, f'{node}/list_parameters')
-            return lister, self.create_client(GetParameters, f'{node}/get_parameters')
+            lister = self._node.create_client(ListParameters, f'{node}/list_parameters')
+            return lister, self._node.create_client(GetParameters, f'{node}/get_parameters')
         except RuntimeError as error:  # SROS 2 may forbid these clients
-            self.get_logger().warning(f'the bag will lack the parameters of {node}: {error}')
+            log = self._node.get_logger()
+            log.warning(f'the bag will lack the parameters of {node}: {error}')
             return None
 
-    def _request_names(self, node: str, peer: _Peer, lister: Client, getter: Client) -> None:
-        def on_response(future: Future) -> None:
-            self._node_parameters.setdefault(node, {})  # changes from now on are recorded
-            self._request_values(list(future.result().result.names), node, peer, getter, {})
+    def _request(self, publisher: bytes, node: str, lister: Client, getter: Client) -> None:
+        known: dict[str, Any] = {}
 
-        lister.call_async(ListParameters.Request()).add_done_callback(on_response)
+        def on_names(future: Future) -> None:
+            self._values.setdefault(node, {})  # changes from now on are recorded
+            ask(list(future.result().result.names))
 
-    def _request_values(
-        self, names: list[str], node: str, peer: _Peer, getter: Client, known: dict[str, Any]
-    ) -> None:
-        """Request values of a node's parameters, and add them to the known ones in the bag."""
+        def ask(names: list[str]) -> None:
+            request = GetParameters.Request(names=names)
+            getter.call_async(request).add_done_callback(partial(on_values, names))
 
-        def on_response(future: Future) -> None:
+        def on_values(names: list[str], future: Future) -> None:
             # Not before: after a restart, get_parameters may be discovered after list_parameters.
-            peer.answered = True
+            self._answered.add(publisher)
             values = future.result().values
-            if len(values) == len(names):
-                try:
-                    known.update(
-                        (name, plain(parameter_value_to_python(value)))
-                        for name, value in zip(names, values, strict=True)
-                    )
-                except RuntimeError as error:  # the parameter type is unknown to ROS
-                    self.get_logger().warning(
-                        f'the bag will lack parameters of {node}: {error}', once=True
-                    )
-                    return
-                self._node_parameters[node] = known
-                self._bag.describe({label.PARAMETERS: json.dumps(self._node_parameters)})
-            elif len(names) > 1:
-                # If one requested parameter has no value, the response has no values at all:
-                # request each parameter alone.
-                for name in names:
-                    self._request_values([name], node, peer, getter, known)
+            if len(values) < len(names):  # one that has no value leaves all others out
+                for name in names[1:] and names:
+                    ask([name])
+                return
+            for name, value in zip(names, values, strict=True):
+                with suppress(RuntimeError):  # a type that ROS does not have
+                    known[name] = plain(parameter_value_to_python(value))
+            self._values[node] = known
+            self._bag.describe({label.PARAMETERS: json.dumps(self._values)})
 
-        request = GetParameters.Request(names=names)
-        getter.call_async(request).add_done_callback(on_response)
+        lister.call_async(ListParameters.Request()).add_done_callback(on_names)
 
     def _on_change(self, event: ParameterEvent) -> None:
         """Record changed parameters of the nodes whose parameters are in the bag."""
-        if event.node not in self._node_parameters:
+        if event.node not in self._values:
             return
-        now_ns = self._clock_ns if self._simulated else time.time_ns()
         for each in event.changed_parameters:
-            with suppress(RuntimeError):  # skip a parameter of a type that ROS does not have
+            with suppress(RuntimeError):
                 value = plain(parameter_value_to_python(each.value))
-                self._changes.append((now_ns, event.node, each.name, value))
+                self._changes.append((self._node.time_ns, event.node, each.name, value))
         self._bag.describe({label.CHANGES: json.dumps(self._changes)})
-
-    def _writer(self, name: str, topic: topics.Topic, legs: Sequence[int]) -> _Write:
-        """Return a function that writes a message: its bytes, and time of receipt, ns."""
-        write = self._bag.write
-        if topic is topics.CLOCK:
-            return partial(self._write_clock, name)
-        if topic.schema.record and not topic.schema.columns:
-            return partial(self._write_records, name, Wire(topic.schema.record, legs).split)
-        if not self._simulated:
-            return lambda data, at_ns: write(name, data, at_ns)
-        if not topic.schema.frame:
-            return lambda data, _: write(name, data, self._clock_ns)
-        return lambda data, _: write(name, data, _stamp_of(data))
-
-    def _write_clock(self, name: str, data: bytes, at_ns: int) -> None:
-        if self._simulated:
-            at_ns = self._clock_ns = max(0, _stamp_of(data))  # a bag has no times before 0
-        self._bag.write(name, data, at_ns)
-
-    def _write_records(
-        self, name: str, split: Callable[[bytes], list[tuple[int, bytes]]], data: bytes, at_ns: int
-    ) -> None:
-        try:
-            records = split(data)
-        except BadMessage as error:
-            self._refusals(name, error)
-            records = [(at_ns, data)]  # it is kept all the same
-        last_ns = records[-1][0]
-        for stamp_ns, record in records:
-            time_ns = stamp_ns if self._simulated else at_ns - (last_ns - stamp_ns)
-            self._bag.write(name, record, max(0, time_ns))
 
 
 def _stamp_of(data: bytes) -> int:
-    """Return the time, ns, with which a message in plain CDR begins; 0 before 1970."""
+    """Return the time, ns, with which a message in plain CDR begins; 0 if there is none."""
     try:
         seconds, rest = _STAMPS[data[1] & 1].unpack_from(data)
     except (IndexError, struct.error):
         return 0
-    return int(max(0, seconds * 1_000_000_000 + rest))
-
-
-def main(args: list[str] | None = None) -> int:
-    """Record until SIGINT or SIGTERM; return the exit status.
-
-    Returns
-    -------
-    int
-        0 when the bag was closed, 1 when it could not be written, 2 for a bad parameter.
-    """
-    return run(RecorderNode, args)
+    return int(seconds * 1_000_000_000 + rest)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(run(RecorderNode))

@@ -11,23 +11,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from rclpy.clock import Clock as NodeClock
-from rclpy.clock import ClockType
-from rclpy.node import Node
 
+from ros_pad.bags import topics
 from ros_pad.bags.topics import STAMP
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation.tuning import SOURCES
-from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import Diagnostics
+from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.markers import ARRAY, WalkMarkers
-from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import SCENE, SEED, Parameter, declare
+from ros_pad.nodes.parameters import SCENE, SEED, Parameter
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import split
-from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, Rate, RealTime
-from ros_pad.records import SAMPLE, Block
+from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, RealTime
+from ros_pad.records import SAMPLE, Block, split
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import Scene
@@ -52,30 +47,20 @@ PARAMETERS = (
         'Sensors: markers, or joints with IMU and forces in the axes of the feet (L2).',
         choices=SOURCES,
     ),
-    Parameter(
-        'rate', 0.0, 'Samples a second, at least 50; 0: the rate of the scene.', 'Hz', 0.0, 1000.0
-    ),
     Parameter('publish_clock', False, 'Stamp with simulated time, and publish it on /clock.'),
     Parameter('free_running', True, 'Step in real time by a timer; false: a program steps it.'),
-    Parameter(
-        'markers_rate',
-        10.0,
-        'Messages a second with markers for RViz and Foxglove; 0: none.',
-        'Hz',
-        0.0,
-        60.0,
-    ),
 )
 
 HIGHEST = 1e6
 """Highest gauge pressure that is accepted, Pa: no regulator's ceiling may exceed it."""
 
-_SLOWEST = 50.0  # Hz, lowest rate that scenes allow
-_REPORT_PERIOD_NS = 1_000_000_000
+MARKERS_PERIOD_NS = 100_000_000
+"""Time between two messages with markers for RViz and Foxglove, ns."""
+
 _LATEST_NS = 50_000_000  # difference of stamps from the clock up to which they stay even
 
 
-class SimulatorNode(Node):
+class SimulatorNode(PadNode):
     """Simulate a robot from the pressures of its pads, and publish the readings of its sensors.
 
     These are samples of all feet, the pose of the body, and joint positions if the robot has
@@ -97,8 +82,6 @@ class SimulatorNode(Node):
         Period of samples and simulated time, ns.
     pressures : list of float
         Last pressure of each pad, gauge Pa, in the order of ``scene.legs``.
-    messages : Messages
-        Publishers and subscriptions.
     answered : callable
         Called with a pressure record that answers the last block of samples, where a program steps
         the robot.
@@ -110,86 +93,72 @@ class SimulatorNode(Node):
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__(
-            'simulator', automatically_declare_parameters_from_overrides=True, **kwargs
-        )
-        values = declare(self, PARAMETERS)
-        if 0.0 < values['rate'] < _SLOWEST:
-            raise ConfigError(
-                f'node {self.get_name()}: parameter rate = {values["rate"]:g} Hz is not allowed:'
-                f' 0, or a number from {_SLOWEST:g} to 1000 Hz is needed'
-            )
+        super().__init__('simulator', PARAMETERS, **kwargs)
+        values, seed = self.values, self.values['seed']
         self.scene: Scene = values['scene']
         if values['foot'] is not None:
             self.scene = replace(self.scene, foot=values['foot'])
-        self.period_ns = round(1e9 / (values['rate'] or self.scene.sensors.rate))
-        self.floor = self.scene.floor.build(values['seed'])
+        self.period_ns = round(1e9 / self.scene.sensors.rate)
+        self.floor = self.scene.floor.build(seed)
         joints = values['sensing'] == 'joints'
         try:
             level = fidelity.level(self.scene, values['fidelity'], joints=joints)
         except InvalidInput as error:
             raise ConfigError(f'node {self.get_name()}: {error}') from error
-        scene, period = with_terms(self.scene), self.period_ns * 1e-9
-        self.robot = fidelity.build(scene, self.floor, period, level)
-        self._sensors = Sensors.of(self.scene, values['seed'])
+        period = self.period_ns * 1e-9
+        self.robot = fidelity.build(with_terms(self.scene), self.floor, period, level)
+        self._sensors = Sensors.of(self.scene, seed)
         self._body_sensors: BodySensors | None = None
         if joints:
-            count = len(self.robot.joint_names)
-            self._body_sensors = BodySensors(self.scene, values['seed'], count)
-        self.time_ns = 0
+            self._body_sensors = BodySensors(self.scene, seed, len(self.robot.joint_names))
+        self.time_ns = self._last_ns = 0  # simulated time, and stamp of the last sample
         self.pressures = [0.0] * len(self.scene.legs)
-        self._pace = Pace(CONTROL_PERIOD_NS)
-        self.messages = Messages(self)
-        self.messages.receive_record(topics.PRESSURE, self.scene.legs, self._on_pressure)
-        rate = values['markers_rate']
-        self._markers = WalkMarkers(self.scene, self.floor) if rate else None
-        self._markers_pace = Pace(round(1e9 / rate)) if rate else None
-        self._simulated = values['publish_clock']
-        self._advertise()
+        self._control_pace, self._markers_pace = Pace(CONTROL_PERIOD_NS), Pace(MARKERS_PERIOD_NS)
+        self._markers = WalkMarkers(self.scene, self.floor)
+        self._outputs = self._advertised()
+        self.receive_record(topics.PRESSURE, self.scene.legs, self._on_pressure)
         # Without a timer, the caller of step() reports fidelity level and verdict.
-        self._ended = False
         self.answered: Callable[[], None] = lambda: None
-        self._last_ns = 0  # stamp of the last sample
         if values['free_running']:
             choice = fidelity.choose(self.scene, level)
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
-            self._diagnostics = Diagnostics(self, self.messages)
             self._real_time: RealTime | None = None
-            self._report_ns = 0  # time of the next message on /diagnostics
-            # The timer cannot follow the clock that this node publishes.
-            steady = NodeClock(clock_type=ClockType.STEADY_TIME)
-            period = max(self.period_ns, CONTROL_PERIOD_NS)
-            self.create_timer(period * 1e-9, self._on_timer, clock=steady)
+            # The timers cannot follow the clock that this node publishes.
+            self.every(max(self.period_ns, CONTROL_PERIOD_NS) * 1e-9, self._on_timer)
+            self.every(1.0, self._diagnose)
 
-    def _advertise(self) -> None:
-        """Create the publishers."""
-        messages, joints = self.messages, self.robot.joint_names
-        self._send_markers = messages.output(topics.MARKERS) if self._markers else None
-        self._send_clock = (
-            messages.sender(topics.CLOCK, topics.CLOCK.schema.values) if self._simulated else None
-        )
+    def _advertised(self) -> dict[str, Callable[..., None]]:
+        """Return a function for each topic, which publishes a message."""
+        joints, noise = self.robot.joint_names, self.scene.sensors
         pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
-        self._send_pose = messages.sender(topics.BODY_POSE, (*STAMP, *pose))
+        measured, parts = ['force', 'position'], ['position']
+        if self._body_sensors:
+            measured, parts = ['force'], ['position', 'velocity', 'effort']
+        measured += ['moment'] * bool(noise.moment)
         record = topics.FORCE if self._body_sensors else topics.SAMPLE
-        measured = ['force'] if self._body_sensors else ['force', 'position']
-        measured += ['moment'] * bool(self.scene.sensors.moment)
-        self._send_block = messages.record_output(record, self.scene.legs, measured)
-        parts = ('position', 'velocity', 'effort') if self._body_sensors else ('position',)
-        angles = [f'{part}[{place}]' for part in parts for place in range(len(joints))]
-        zeros = {'name': joints} | {part: [0.0] * len(joints) for part in parts}
+        outputs = {
+            'markers': self.output(topics.MARKERS),
+            'pose': self.sender(topics.BODY_POSE, (*STAMP, *pose)),
+            'record': self.record_output(record, self.scene.legs, measured),
+        }
+        if self.values['publish_clock']:
+            outputs['clock'] = self.sender(topics.CLOCK, topics.CLOCK.values)
         if joints:
-            self._send_joints = messages.sender(
-                topics.JOINT_STATES, (*STAMP, *angles), constants=zeros
+            angles = [f'{part}[{place}]' for part in parts for place in range(len(joints))]
+            constants = {'name': joints} | {part: [0.0] * len(joints) for part in parts}
+            outputs['joints'] = self.sender(
+                topics.JOINT_STATES, (*STAMP, *angles), constants=constants
             )
         if self._body_sensors:
-            noise = self.scene.sensors
-            still = {
+            covariances = {
                 'orientation_covariance': [-1.0] + [0.0] * 8,  # it measures no orientation
                 'angular_velocity_covariance': np.diag([noise.gyro**2] * 3).ravel(),
                 'linear_acceleration_covariance': np.diag([noise.accelerometer**2] * 3).ravel(),
             }
-            imu = (*STAMP, *topics.IMU.schema.values)
-            self._send_imu = messages.sender(topics.IMU, imu, constants=still)
+            outputs['imu'] = self.sender(
+                topics.IMU, (*STAMP, *topics.IMU.values), constants=covariances
+            )
+        return outputs
 
     def _on_pressure(self, block: Block) -> None:
         rows = block.rows[-1]
@@ -212,36 +181,29 @@ class SimulatorNode(Node):
         now_ns = time.monotonic_ns()
         if self._real_time is None:  # what passed before the executor spun is no delay
             self._real_time = RealTime(self.period_ns, now_ns)
-            self._report_ns = now_ns + _REPORT_PERIOD_NS
         # Half a period ahead, because a timer of the same period may come early or late.
         due = self._real_time.due(now_ns + self.period_ns // 2)
         if due:
             self._advance(due)
-        if self.robot.verdict and not self._ended:
-            self._ended = True
-            self.get_logger().error(
-                f'the walk is not valid after {self.robot.time:.3f} s: {self.robot.verdict}'
-            )
-        if now_ns >= self._report_ns:
-            self._report_ns = now_ns + _REPORT_PERIOD_NS
-            self._diagnose(self._real_time.rate(now_ns))
+        if self.robot.verdict:
+            text = f'the walk is not valid after {self.robot.time:.3f} s: {self.robot.verdict}'
+            self.get_logger().error(text, once=True)
 
-    def _diagnose(self, rate: Rate) -> None:
-        late = rate.reached < 0.95 * rate.wanted
-        text = f'{rate.reached:.0f} of {rate.wanted:.0f} samples a second'
-        if late:
-            text = f'{LATE}: {text}: choose a lower rate, L1, or a faster computer'
+    def _diagnose(self) -> None:
+        if self._real_time is None:
+            return
+        speed, wanted = self._real_time.speed(time.monotonic_ns()), 1e9 / self.period_ns
+        text, level = f'{speed * wanted:.0f} of {wanted:.0f} samples a second', self.OK
+        if speed < 0.95:
+            text, level = f'{LATE}: {text}: choose L1, or a faster computer', self.WARN
             self.get_logger().warning(text, throttle_duration_sec=10.0)
         values = {
-            'wanted rate (Hz)': f'{rate.wanted:.1f}',
-            'reached rate (Hz)': f'{rate.reached:.1f}',
-            'speed (times real time)': f'{rate.speed:.3f}',
+            'wanted rate (Hz)': f'{wanted:.1f}',
+            'reached rate (Hz)': f'{speed * wanted:.1f}',
+            'speed (times real time)': f'{speed:.3f}',
         }
-        status = self._diagnostics.status(
-            'rate', Diagnostics.WARN if late else Diagnostics.OK, text, values
-        )
-        now_ns = self.time_ns if self._simulated else self.messages.now_ns()
-        self._diagnostics.send(now_ns, [status])
+        now_ns = self.time_ns if self.values['publish_clock'] else self.now_ns()
+        self.report(now_ns, [self.status('rate', level, text, values)])
 
     def step(self, end_ns: int) -> bool:
         """Advance the robot to the next control moment, and publish what its sensors read.
@@ -252,69 +214,64 @@ class SimulatorNode(Node):
         samples, due = 0, False
         while not due and self.time_ns + samples * self.period_ns < end_ns:
             samples += 1
-            due = self._pace.due(self.time_ns + samples * self.period_ns)
+            due = self._control_pace.due(self.time_ns + samples * self.period_ns)
         return self._advance(samples) == samples and due
 
     def _advance(self, samples: int) -> int:
         """Advance the robot by some samples, fewer if its walk ends; publish and count them."""
-        first_ns = self.time_ns + self.period_ns
-        if not self._simulated:
+        simulated, first_ns = self.values['publish_clock'], self.time_ns + self.period_ns
+        if not simulated:
             # Stamps are even, unless time was lost.
             first_ns = self._last_ns + self.period_ns
-            begun_ns = self.messages.now_ns() - (samples - 1) * self.period_ns
+            begun_ns = self.now_ns() - (samples - 1) * self.period_ns
             if abs(first_ns - begun_ns) > _LATEST_NS:
                 first_ns = begun_ns
         stamps = first_ns + self.period_ns * np.arange(samples)
         rows = SAMPLE.rows(samples, len(self.scene.legs))
         # Forces go first: a reading of the joints waits for them only until the next one.
-        later: list[tuple[Callable[..., None], tuple[float, ...]]] = []
+        later: list[tuple[str, tuple[float, ...]]] = []
         count = 0
         for row, stamp_ns in zip(rows, stamps.tolist(), strict=True):
             count += 1
             self.robot.step(self.pressures)
             stamp = split(stamp_ns)
             x, y, heading = self.robot.body
-            self._send_pose(*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
-            if self._body_sensors:
-                row[:] = self._sense(stamp, later)
-            else:
-                row[:] = self._sensors.sample(self.robot)
-            if self.robot.verdict and self._simulated:
+            turn = math.sin(0.5 * heading), math.cos(0.5 * heading)
+            self._outputs['pose'](*stamp, x, y, *turn)
+            row[:] = self._sense(stamp, later)
+            if self.robot.verdict and simulated:
                 break
         self._last_ns = int(stamps[count - 1])
         self.tick(count)
-        self._send_block(Block(stamps[:count], rows[:count]))
-        for send, values in later:
-            send(*values)
+        self._outputs['record'](Block(stamps[:count], rows[:count]))
+        for name, values in later:
+            self._outputs[name](*values)
         if self.robot.joint_names and not self._body_sensors:
-            self._send_joints(*split(self._last_ns), *self.robot.joint_positions)
-        if self._markers and self._markers_pace and self._markers_pace.due(self._last_ns):
-            assert self._send_markers
+            self._outputs['joints'](*split(self._last_ns), *self.robot.joint_positions)
+        if self._markers_pace.due(self._last_ns):
             array = self._markers.message(self.robot, self.pressures, self._last_ns)
-            self._send_markers(ARRAY.encode(array))
+            self._outputs['markers'](ARRAY.encode(array))
         return count
 
-    def _sense(self, stamp: tuple[int, int], later: list[tuple[Any, Any]]) -> np.ndarray:
-        """Return readings of the feet in their own axes; add those of IMU and joints."""
-        assert self._body_sensors
+    def _sense(
+        self, stamp: tuple[int, int], later: list[tuple[str, tuple[float, ...]]]
+    ) -> np.ndarray:
+        """Return readings of the feet; add those of IMU and joints."""
+        if not self._body_sensors:
+            return self._sensors.sample(self.robot)
         assert isinstance(self.robot, FullRobot)
         reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
-        later.append((self._send_imu, (*stamp, *reading.imu.ravel().tolist())))
-        later.append((self._send_joints, (*stamp, *reading.joints.ravel().tolist())))
+        later.append(('imu', (*stamp, *reading.imu.ravel().tolist())))
+        later.append(('joints', (*stamp, *reading.joints.ravel().tolist())))
         return reading.rows
 
     def tick(self, samples: int = 1) -> None:
         """Advance simulated time, but not the robot; :meth:`step` does both."""
         self.time_ns += samples * self.period_ns
-        if self._send_clock:
+        if self.values['publish_clock']:
             self._last_ns = self.time_ns
-            self._send_clock(*split(self.time_ns))
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until it is interrupted; return the exit status."""
-    return run(SimulatorNode, args)
+            self._outputs['clock'](*split(self.time_ns))
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(run(SimulatorNode))

@@ -9,16 +9,17 @@ from functools import partial
 from ros_pad.signals import STOP
 
 
-def _start(name: str) -> int:
+def _start(name: str, kind: str) -> int:
     STOP.install()
-    return int(importlib.import_module(f'ros_pad.nodes.{name}').main())
+    node = getattr(importlib.import_module(f'ros_pad.nodes.{name}'), kind)
+    return int(importlib.import_module('ros_pad.nodes.process').run(node))
 
 
-body_estimator = partial(_start, 'body_estimator')
-controller = partial(_start, 'controller')
-estimator = partial(_start, 'estimator')
-merge = partial(_start, 'merge')
-recorder = partial(_start, 'recorder')
-regulator = partial(_start, 'regulator')
-simulator = partial(_start, 'simulator')
-views = partial(_start, 'views')
+body_estimator = partial(_start, 'body_estimator', 'BodyEstimatorNode')
+controller = partial(_start, 'controller', 'ControllerNode')
+estimator = partial(_start, 'estimator', 'EstimatorNode')
+merge = partial(_start, 'merge', 'MergeNode')
+recorder = partial(_start, 'recorder', 'RecorderNode')
+regulator = partial(_start, 'regulator', 'RegulatorNode')
+simulator = partial(_start, 'simulator', 'SimulatorNode')
+views = partial(_start, 'views', 'ViewsNode')

@@ -15,23 +15,20 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from rclpy.node import Node
 from std_msgs.msg import String
 
-from ros_pad.bags import topics as schemas
-from ros_pad.bags.topics import STAMP
+from ros_pad.bags import topics
+from ros_pad.bags.topics import STAMP, Topic
 from ros_pad.control.policies import DOME, FLAT
 from ros_pad.estimation import doubt as doubts
-from ros_pad.nodes import topics
+from ros_pad.nodes.base import PadNode, set_stamp
 from ros_pad.nodes.markers import ARRAY, marker_of_foot
-from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, declare
+from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import set_stamp, split
 from ros_pad.pace import Pace
-from ros_pad.records import Block
+from ros_pad.records import Block, split
 
-SHOWN = [each for each in schemas.OF_LEGS if each is not schemas.LEG_FOOT_WRENCH]
+SHOWN = [each for each in topics.OF_LEGS if each is not topics.LEG_FOOT_WRENCH]
 """Topics of a leg that records have."""
 
 PARAMETERS = (
@@ -41,7 +38,7 @@ PARAMETERS = (
         'topics',
         ', '.join(each.kind for each in SHOWN),
         'Topics of each leg that are published, with commas between them: not those of a driver.',
-        read=lambda text: topics.chosen(text, SHOWN),
+        read=chosen(SHOWN),
     ),
     Parameter(
         'frame', 'world', 'Frame of the positions of the feet: world, or odom without markers.'
@@ -55,61 +52,48 @@ Show = Callable[[int, Any], None]
 """Publishes a row of a record with its stamp, ns."""
 
 
-class ViewsNode(Node):
-    """Publish what records say of single legs; parameters are in :data:`PARAMETERS`.
-
-    Attributes
-    ----------
-    messages : Messages
-        Publishers and subscriptions.
-    """
+class ViewsNode(PadNode):
+    """Publish what records say of single legs; parameters are in :data:`PARAMETERS`."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__('views', automatically_declare_parameters_from_overrides=True, **kwargs)
-        values = declare(self, PARAMETERS)
-        self._ambient, self._frame = values['ambient_pressure'], values['frame']
-        self._legs: list[int] = values['legs']
-        self.messages = messages = Messages(self)
-        texts = {schemas.LEG_DOUBT: _doubt, schemas.LEG_MORPHOLOGY: _morphology}
-        shows: dict[str, list[tuple[int, Show]]] = {}
-        for index, leg in enumerate(self._legs):
-            for schema in values['topics']:
-                assert schema.record
-                show = self._text(schema, leg, texts[schema]) if schema.text else None
-                show = show or self._numbers(schema, leg)
-                shows.setdefault(f'feet/{schema.record.name}', []).append((index, show))
-        for topic in topics.RECORDS:
-            if topic is not topics.FORCE:
-                messages.receive_record(
-                    topic, self._legs, partial(self._show, shows.get(topic.name(), []))
-                )
-        messages.receive_record(topics.ESTIMATE, self._legs, self._mark)
-        self._send_markers = messages.output(topics.FEET_MARKERS)
-        self._pace = Pace(MARKERS_PERIOD_NS)
+        super().__init__('views', PARAMETERS, **kwargs)
+        self._legs: list[int] = self.values['legs']
+        texts = {topics.LEG_DOUBT: _doubt, topics.LEG_MORPHOLOGY: _morphology}
+        for record in topics.RECORDS:
+            shows: list[tuple[int, Show]] = []
+            for index, leg in enumerate(self._legs):
+                for topic in self.values['topics']:
+                    if topic.record is record.record and record is not topics.FORCE:
+                        own = texts.get(topic)
+                        show = self._text(topic, leg, own) if own else self._numbers(topic, leg)
+                        shows.append((index, show))
+            if shows:
+                self.receive_record(record, self._legs, partial(self._show, shows))
+        self.receive_record(topics.ESTIMATE, self._legs, self._mark)
+        self._send_markers = self.output(topics.FEET_MARKERS)
+        self._markers_pace = Pace(MARKERS_PERIOD_NS)
         self._places = np.full((len(self._legs), 2), np.nan)
 
-    def _numbers(self, schema: schemas.Topic, leg: int) -> Show:
+    def _numbers(self, topic: Topic, leg: int) -> Show:
         """Return a function that publishes numbers of a leg, if none of them is missing."""
-        topic = topics.of_leg(schema)
-        send = self.messages.sender(topic, (*(STAMP if schema.frame else ()), *schema.values), leg)
-        assert schema.record
-        columns = [schema.record.columns.index(each) for each in schema.columns]
-        needed = slice(0, 3) if schema is schemas.LEG_WRENCH else slice(None)
+        send = self.sender(topic, (*(STAMP if topic.frame else ()), *topic.values), leg)
+        assert topic.record
+        columns = [topic.record.columns.index(each) for each in topic.columns]
+        needed = slice(0, 3) if topic is topics.LEG_WRENCH else slice(None)
 
         def show(stamp_ns: int, row: np.ndarray) -> None:
             numbers = np.atleast_1d(row).view('f8').ravel()[columns]
             if np.isnan(numbers[needed]).any():
                 return
-            values = schemas.from_record(
-                schema, np.nan_to_num(numbers, posinf=np.inf), self._ambient
-            )
-            send(*(split(stamp_ns) if schema.frame else ()), *values.tolist())
+            numbers = np.nan_to_num(numbers, posinf=np.inf)
+            values = topics.from_record(topic, numbers, self.values['ambient_pressure'])
+            send(*(split(stamp_ns) if topic.frame else ()), *values.tolist())
 
         return show
 
-    def _text(self, schema: schemas.Topic, leg: int, text_of: Callable[[Any], str | None]) -> Show:
+    def _text(self, topic: Topic, leg: int, text_of: Callable[[Any], str | None]) -> Show:
         """Return a function that publishes a text of a leg when it changes."""
-        publish, last = self.messages.output(topics.of_leg(schema), leg), ['?']
+        publish, last = self.output(topic, leg), ['?']
 
         def show(stamp_ns: int, row: np.ndarray) -> None:
             text = text_of(row)
@@ -129,15 +113,17 @@ class ViewsNode(Node):
         rows = block.rows[-1]
         known = np.isfinite(rows['position']).all(axis=1)
         self._places[known] = rows['position'][known]
-        if not self._pace.due(block.last_ns):
+        if not self._markers_pace.due(block.last_ns):
             return
+        if self.refused and self.due(block.last_ns):
+            self.report(block.last_ns, [])
         array = ARRAY.blank()
         for leg, place, wetness in zip(
             self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True
         ):
             if math.isfinite(sum(place)):
                 marker = marker_of_foot(leg, place[0], place[1], wetness)
-                marker.header.frame_id = self._frame
+                marker.header.frame_id = self.values['frame']
                 set_stamp(marker.header.stamp, block.last_ns)
                 array.markers.append(marker)
         self._send_markers(ARRAY.encode(array))
@@ -153,10 +139,5 @@ def _morphology(row: Any) -> str | None:
     return None if math.isnan(row['dome']) else DOME if row['dome'] == 1.0 else FLAT
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node until it is interrupted; return the exit status."""
-    return run(ViewsNode, args)
-
-
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(run(ViewsNode))

@@ -55,22 +55,21 @@ def create(backend: str, **options: Any) -> Regulator:
     """
     if backend not in BACKENDS:
         raise ConfigError(
-            f'there is no regulator backend {backend!r}{_nearest(backend, BACKENDS)}: '
-            f'the backends are {", ".join(sorted(BACKENDS))}'
+            f'there is no regulator backend {backend!r}{_nearest(backend, BACKENDS)}: the backends'
+            f' are {", ".join(BACKENDS)}'
         )
-    make = BACKENDS[backend]
-    allowed = inspect.signature(make).parameters
-    for name, value in options.items():
+    allowed = inspect.signature(BACKENDS[backend]).parameters
+    for name in options:
         if name not in allowed:
             raise ConfigError(
-                f'regulator backend {backend!r} has no option {name!r} (= {value!r})'
+                f'regulator backend {backend!r} has no option {name!r} (= {options[name]!r})'
                 f'{_nearest(name, allowed)}: its options are {", ".join(allowed)}'
             )
     missing = [name for name, p in allowed.items() if p.default is p.empty and name not in options]
     if missing:
         raise ConfigError(f'regulator backend {backend!r} needs the option {missing[0]!r}')
     try:
-        return make(**options)
+        return BACKENDS[backend](**options)
     except InvalidInput as error:
         raise ConfigError(f'regulator backend {backend!r}: {error}') from error
 

@@ -7,10 +7,9 @@ import math
 import re
 
 from ros_pad.configuration import choice
-from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.errors import ConfigError, DeviceFault, InvalidInput, ProtocolError
 from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.serial_device import Frame, SerialRegulator, unit
-from ros_pad.regulators.transport import Query, SerialLine
+from ros_pad.regulators.serial_device import Frame, Query, SerialLine, SerialRegulator, unit
 
 STATUS = {
     'ADC': 'ADC (analogue converter failed)',
@@ -50,7 +49,8 @@ class AlicatRegulator(SerialRegulator):
     baudrate : int
         1/s, 300 to 4,000,000. Delivered devices have 19200, those of the BC series 38400.
     set_command : str
-        ``'LS'``, ``'S'``, or ``'auto'``: LS with firmware 9v00 or later, S with an older one.
+        ``'auto'``: LS with firmware 9v00 or later, S with an older one; or ``'S'``, for a device
+        that rejects LS with a unit.
     ceiling : float
         Highest set-point, gauge Pa, 1 to 1e7.
     reply_timeout, poll_period, silence : float
@@ -64,7 +64,7 @@ class AlicatRegulator(SerialRegulator):
     ``LS value unit`` sets a pressure in the units found at identification; the reply contains
     value and units. A device whose units were changed since then is set to zero, and is lost until
     its units are as before. The reply to ``S``, which every firmware has, is a frame. Values sent
-    with ``LS`` and ``S`` have the decimals of the last frame. With ``auto``, ``LS`` is never sent
+    with ``LS`` and ``S`` have the decimals of the last frame. ``LS`` is never sent
     to firmware below 9v00, which reads ``L`` as the lock of the front panel. No command saves
     settings, because that wears the device's memory. A device with an analogue set-point source
     ignores set-points without an error; ``LSS`` detects that from 10v05 on, and the echo of the
@@ -95,7 +95,7 @@ class AlicatRegulator(SerialRegulator):
             )
         self._unit = unit(units)
         self._units = units
-        self._set_command = choice('set_command', set_command, ('auto', 'LS', 'S'))
+        self._plain = choice('set_command', set_command, ('auto', 'S')) == 'S'
         self._unit_code = ''  # code of the device's units; empty when S sets the pressure
         self._decimals = 0
         self._held = False
@@ -105,17 +105,17 @@ class AlicatRegulator(SerialRegulator):
     def identify(self, query: Query) -> Frame:
         """Check units and set-point source as far as the firmware reports them; return a frame."""
         frame = self.poll(query)
-        command = f'{self.address}VE'
-        version = re.search(r'\b(\d+)v(\d+)', query(command))
+        version = re.search(r'\b(\d+)v(\d+)', query(f'{self.address}VE'))
         firmware = (int(version[1]), int(version[2])) if version else (0, 0)
         self._unit_code = ''
-        if self._set_command == 'LS' or firmware >= UNITS_SINCE:
-            command = f'{self.address}LS'
-            _, code = self._setpoint_in(command, self._accepted(query, command))
-            if self._set_command != 'S':
-                self._unit_code = code
+        if firmware >= UNITS_SINCE:
+            _, code = self._setpoint_in(*self._sent(query, 'LS'))
+            self._unit_code = '' if self._plain else code
         if firmware >= SOURCE_SINCE:
-            self._check_source(query)
+            command, reply = self._sent(query, 'LSS')
+            if self._words(command, reply)[-1:] == ['A']:
+                what = 'the set-point source of the device is analogue: set it to serial'
+                raise self.error(DeviceFault, what, command, reply)
         return frame
 
     def poll(self, query: Query) -> Frame:
@@ -124,47 +124,49 @@ class AlicatRegulator(SerialRegulator):
 
     def send(self, query: Query, setpoint: float) -> Frame | None:
         """Send a set-point, gauge Pa; for a vent, also release valves that are held."""
-        release = self._held and setpoint == 0.0
-        frame = self._send_value(query, f'{setpoint / self._unit:.{self._decimals}f}')
+        release, value = self._releases(setpoint), f'{setpoint / self._unit:.{self._decimals}f}'
+        frame = None
+        if self._unit_code:
+            self._send_with_unit(query, value)
+        else:
+            frame = self._frame_in(*self._sent(query, f'S{value}'))
         if release:  # after the set-point, because released valves follow the one in force
-            command = f'{self.address}C'
-            frame = self._frame_in(command, self._accepted(query, command))
+            frame = self._frame_in(*self._sent(query, 'C'))
         return frame
 
-    def _send_value(self, query: Query, value: str) -> Frame | None:
-        if not self._unit_code:
-            command = f'{self.address}S{value}'
-            return self._frame_in(command, self._accepted(query, command))
-        command = f'{self.address}LS {value} {self._unit_code}'
-        reply = self._accepted(query, command)
+    def _send_with_unit(self, query: Query, value: str) -> None:
+        command, reply = self._sent(query, f'LS {value} {self._unit_code}')
         try:
             requested, _ = self._setpoint_in(command, reply)
         except ConfigError:
-            self._accepted(query, f'{self.address}S0')  # zero is the same in all units
+            self._sent(query, 'S0')  # zero is the same in all units
             raise
         if requested != float(value):
-            raise self.device_fault(
-                f'set-point {value} was sent, {requested:g} is in force', command, reply
-            )
-        return None
+            what = f'set-point {value} was sent, {requested:g} is in force'
+            raise self.error(DeviceFault, what, command, reply)
 
     def in_force(self, frame: Frame, setpoint: float) -> bool:
         """Return whether a frame shows a set-point; False for a vent while valves are held."""
-        held = self._held and setpoint == 0.0
-        return super().in_force(frame, setpoint) and not held
+        return super().in_force(frame, setpoint) and not self._releases(setpoint)
 
-    def _accepted(self, query: Query, command: str) -> str:
-        """Send a command and return its reply; raise if the device rejects it."""
+    def _releases(self, setpoint: float) -> bool:
+        """Return whether a set-point has to release valves that are held."""
+        return self._held and setpoint == 0.0
+
+    def _sent(self, query: Query, order: str) -> tuple[str, str]:
+        """Send an order; return command and reply; raise if the device rejects it."""
+        command = f'{self.address}{order}'
         reply = query(command)
         if reply == '?' or reply.split() == [self.address, '?']:
-            raise self.device_fault('the device rejected the command', command, reply)
-        return reply
+            raise self.error(DeviceFault, 'the device rejected the command', command, reply)
+        return command, reply
 
     def _words(self, command: str, reply: str) -> list[str]:
         """Return the words of a reply after the unit ID."""
         words = reply.split()
         if words[:1] != [self.address]:
-            raise self.protocol_error(f'the reply is not of unit {self.address}', command, reply)
+            what = f'the reply is not of unit {self.address}'
+            raise self.error(ProtocolError, what, command, reply)
         return words[1:]
 
     def _frame_in(self, command: str, reply: str) -> Frame:
@@ -172,13 +174,11 @@ class AlicatRegulator(SerialRegulator):
         numbers = [match for word in words if (match := _NUMBER.fullmatch(word))]
         status = words[len(numbers) :]
         if len(numbers) != 2 or not set(status) <= set(STATUS):
-            raise self.protocol_error(
-                'the reply is not a frame of pressure, set-point and known status letters'
-                f' (numbers found: {len(numbers)}); remove other columns from the data frame on'
-                ' the device',
-                command,
-                reply,
+            what = (
+                'the reply is not a frame of pressure, set-point and known status letters; remove'
+                ' other columns from the data frame on the device'
             )
+            raise self.error(ProtocolError, what, command, reply)
         pressure, setpoint = (float(each[0]) * self._unit for each in numbers)
         self._decimals = len(numbers[1][1] or '')
         self._held = 'HLD' in status
@@ -190,9 +190,8 @@ class AlicatRegulator(SerialRegulator):
         """Return set-point and code of the units in an answer to ``LS``."""
         words = self._words(command, reply)
         if len(words) != 4 or not all(map(_NUMBER.fullmatch, words[:2])) or not words[2].isdigit():
-            raise self.protocol_error(
-                'the reply does not have two numbers, a code and a unit', command, reply
-            )
+            what = 'the reply does not have two numbers, a code and a unit'
+            raise self.error(ProtocolError, what, command, reply)
         _, requested, code, label = words
         # G means gauge; a device without a letter may be differential. A and D are never gauge.
         if label.lower() not in (self._units.lower(), f'{self._units}g'.lower()):
@@ -202,14 +201,3 @@ class AlicatRegulator(SerialRegulator):
                 f' reply {reply!r}'
             )
         return float(requested), code
-
-    def _check_source(self, query: Query) -> None:
-        command = f'{self.address}LSS'
-        reply = self._accepted(query, command)
-        if self._words(command, reply)[-1:] == ['A']:
-            raise self.device_fault(
-                'the set-point source of the device is analogue, so that it ignores set-points on'
-                ' this line; set the source to serial on the device',
-                command,
-                reply,
-            )

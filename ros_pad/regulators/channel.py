@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from ros_pad.configuration import Setting
 from ros_pad.control.faults import Fault, Kind, joined
@@ -84,19 +84,6 @@ class Health(NamedTuple):
 
     level: Level
     message: str
-
-
-class Log(Protocol):
-    """Log of a channel; the logger of an rclpy node is one."""
-
-    def info(self, message: str) -> Any:
-        """Log an event."""
-
-    def warning(self, message: str, *, throttle_duration_sec: float) -> Any:
-        """Log a problem, at most once in the given time."""
-
-    def error(self, message: str, *, throttle_duration_sec: float = 0.0) -> Any:
-        """Log an error, at most once in the given time."""
 
 
 class NoLog:
@@ -228,7 +215,7 @@ class SupervisedChannel:
         Not yet open. Its ceiling is the limit of commands.
     settings : SupervisorSettings
         May be replaced at any time through the attribute.
-    log : Log
+    log : logger of an rclpy node, or None
         Receives refusals, faults and vents.
 
     Attributes
@@ -254,7 +241,7 @@ class SupervisedChannel:
         leg: int,
         regulator: Regulator,
         settings: SupervisorSettings = DEFAULTS,
-        log: Log | None = None,
+        log: Any = None,
     ) -> None:
         self.leg = leg
         self.settings = settings
@@ -266,7 +253,7 @@ class SupervisedChannel:
         self.held = ''
         self.commanded_ns: int | None = None
         self._hold = Kind.NONE()
-        self._log: Log = log or NoLog()
+        self._log = log or NoLog()
         self._device_faults: tuple[str, ...] = ()
 
     @property

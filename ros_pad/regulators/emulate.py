@@ -10,12 +10,15 @@ import select
 import threading
 import time
 import tty
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any
 
-from ros_pad.configuration import number
+from ros_pad.configuration import choice, integer, number
 from ros_pad.errors import InvalidInput, TransportError
+from ros_pad.regulators.alicat import SOURCE_SINCE, STATUS, UNITS_SINCE
 from ros_pad.regulators.serial_device import unit
+from ros_pad.regulators.smc_itv import FULL_COUNT
 
 LINE_FAULTS = ('silence', 'half_line', 'garbage', 'unplugged')
 """Faults of any line; each device has further ones."""
@@ -54,17 +57,14 @@ class FaultSchedule:
                 start, end = math.nan, math.nan
             if not 0.0 <= start < end:
                 raise InvalidInput(
-                    f'fault {text!r} is not allowed: KIND, KIND:START or KIND:START:END is needed,'
-                    ' with times in s, from 0, and START before END'
+                    f'fault {text!r} is not allowed: KIND[:START[:END]] is needed, with 0 <= START'
+                    ' < END in s'
                 )
             self.add(kind, start, end)
 
     def add(self, kind: str, start: float = 0.0, end: float = math.inf) -> None:
         """Add a fault that is active from one time to another, s."""
-        if kind.partition('@')[0] not in self._allowed:
-            raise InvalidInput(
-                f'fault {kind!r} is not allowed: one of {", ".join(self._allowed)} is needed'
-            )
+        choice('fault', kind.partition('@')[0], self._allowed)
         self._acting[kind] = (start, end)
 
     def clear(self) -> None:
@@ -120,14 +120,46 @@ class Valve:
         return self._pressure
 
 
-class EmulatedDevice(Protocol):
-    """A device, or several on one bus, that answers commands."""
+class EmulatedDevice(ABC):
+    """A device, or several on one bus, that answers commands.
 
-    terminator: str
-    faults: FaultSchedule
+    Parameters
+    ----------
+    addresses : sequence of str
+        Names of the devices on the bus.
+    full_scale : float
+        Highest pressure, gauge Pa, above 0.
+    time_constant : float
+        Time constant of the pressures, s, above 0.
+    schedule : sequence of str
+        See :class:`FaultSchedule`.
+    """
 
+    FAULTS: tuple[str, ...] = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
+    terminator = '\n'
+
+    def __init__(
+        self,
+        addresses: Sequence[str],
+        full_scale: float,
+        time_constant: float,
+        schedule: Sequence[str],
+    ) -> None:
+        self.full_scale = number('full_scale', full_scale, 'Pa', above=True)
+        self.valves = {each: Valve(time_constant) for each in addresses}
+        self.faults = FaultSchedule(self.FAULTS, schedule)
+
+    @abstractmethod
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the answering address and its reply; None for no reply."""
+
+    def follow(self, address: str, setpoint: float) -> float:
+        """Set a valve as far as faults allow; return the set-point that the reply shows, Pa."""
+        if self.faults.act('echo', address):
+            setpoint *= 0.5
+        if not self.faults.act('analog_source', address):
+            self.valves[address].setpoint = setpoint
+        return setpoint
 
 
 class Emulator:
@@ -155,49 +187,41 @@ class Emulator:
         Port to open.
     commands : list of str
         Last received commands, oldest first, at most 1000.
-    ended : threading.Event
-        Set when the emulator has ended.
     """
 
     def __init__(self, device: EmulatedDevice, link: str | None = None) -> None:
-        if link and os.path.lexists(link):
-            raise InvalidInput(f'link = {link!r} is not allowed: this path exists already')
-        if link and not os.path.isdir(os.path.dirname(link) or '.'):
-            raise InvalidInput(f'link = {link!r} is not allowed: its folder does not exist')
+        if link and (os.path.lexists(link) or not os.path.isdir(os.path.dirname(link) or '.')):
+            raise InvalidInput(
+                f'link = {link!r} is not allowed: a new path in a folder that exists is needed'
+            )
         self._device = device
         self._link = link
         self._closing = threading.Event()
-        self.ended = threading.Event()
         self._error: Exception | None = None
         self._ends: tuple[int, int] | None = None
         self._buffer = b''
         self.commands: list[str] = []
         self.path = link or ''
         self._plug()
-        self._thread = threading.Thread(target=self._run, name='emulator', daemon=True)
+        self._thread = threading.Thread(target=self._serve, name='emulator', daemon=True)
         self._thread.start()
 
     def __enter__(self) -> Emulator:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind:  # the error of the with block is raised, not that of the emulator
-            self._error = None
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def wait(self) -> None:
         """Wait until the emulator ends because of an error, and raise it."""
-        self.ended.wait()
-        self._raise_error()
+        self._closing.wait()
+        self.close()
 
     def close(self) -> None:
         """Remove the device and its port; raise the error that ended it, if not raised before."""
         self._closing.set()
         self._thread.join()
         self._unplug()
-        self._raise_error()
-
-    def _raise_error(self) -> None:
         error, self._error = self._error, None
         if error:
             raise error
@@ -216,13 +240,9 @@ class Emulator:
             os.symlink(os.ttyname(far), self._link)
         except OSError as error:
             self._unplug()
-            what = (
-                'another file has this path now'
-                if isinstance(error, FileExistsError)
-                else str(error.strerror)
-            )
             raise TransportError(
-                f'link = {self._link!r}: the device cannot be plugged in: {what}', self._link
+                f'link = {self._link!r}: the device cannot be plugged in: {error.strerror}',
+                self._link,
             ) from error
 
     def _unplug(self) -> None:
@@ -234,27 +254,25 @@ class Emulator:
                 os.close(end)
             self._ends = None
 
-    def _run(self) -> None:
+    def _serve(self) -> None:
         try:
-            self._serve()
+            while not self._closing.is_set():
+                self._turn()
         except Exception as error:  # raised by wait() and close()
             self._error = error
-        self.ended.set()
+            self._closing.set()
 
-    def _serve(self) -> None:
-        while not self._closing.is_set():
-            if self._device.faults.act('unplugged'):
-                self._unplug()
-                self._closing.wait(0.005)
-                continue
-            if self._ends is None:
-                self._plug()
-            assert self._ends
-            near = self._ends[0]
-            if not select.select([near], [], [], 0.01)[0]:
-                continue
+    def _turn(self) -> None:
+        if self._device.faults.act('unplugged'):
+            self._unplug()
+            self._closing.wait(0.005)
+            return
+        if self._ends is None:
+            self._plug()
+        assert self._ends
+        near, end = self._ends[0], self._device.terminator.encode()
+        if select.select([near], [], [], 0.01)[0]:
             self._buffer += os.read(near, 4096)
-            end = self._device.terminator.encode()
             while end in self._buffer:
                 line, _, self._buffer = self._buffer.partition(end)
                 self._reply(near, line.decode('ascii', 'replace'))
@@ -276,7 +294,7 @@ class Emulator:
         os.write(near, reply)
 
 
-class AlicatEmulator:
+class AlicatEmulator(EmulatedDevice):
     """Alicat pressure controllers on one bus.
 
     Parameters
@@ -285,8 +303,6 @@ class AlicatEmulator:
         Unit ID of each device, one letter from A to Z, e.g. ``'ABCDEF'``.
     units : str
         Engineering units, a key of ``serial_device.UNITS``.
-    decimals : int
-        Decimals of the numbers in a frame.
     firmware : str
         Version, such as ``'10v20'``. Firmware has LS from 9v00 on and LSS from 10v05 on. Before
         9v00 it reads every command that begins with L as the lock of the front panel.
@@ -298,10 +314,9 @@ class AlicatEmulator:
         See :class:`FaultSchedule`.
     """
 
-    STATUS = ('ADC', 'EXH', 'HLD', 'LCK', 'MOV', 'OPL', 'OVR', 'POV', 'TMF', 'TOV', 'VOV')
     FAULTS = (
-        *LINE_FAULTS,
-        *('wrong_id', 'wrong_unit', 'rejection', 'analog_source', 'echo'),
+        *EmulatedDevice.FAULTS,
+        *('wrong_id', 'wrong_unit'),
         *(f'status={each}' for each in STATUS),
     )
     terminator = '\r'
@@ -310,30 +325,23 @@ class AlicatEmulator:
         self,
         unit_ids: str = 'A',
         units: str = 'kPa',
-        decimals: int = 2,
         firmware: str = '10v20',
         full_scale: float = 150e3,
         time_constant: float = 0.1,
         schedule: Sequence[str] = (),
     ) -> None:
-        if not unit_ids or not unit_ids.isalpha() or not unit_ids.isupper():
-            raise InvalidInput(
-                f'unit_ids = {unit_ids!r} is not allowed: one or more letters from A to Z are'
-                ' needed'
-            )
-        if not re.fullmatch(r'\d+v\d+', firmware):
-            raise InvalidInput(
-                f'firmware = {firmware!r} is not allowed: a version such as 10v20 is needed'
-            )
+        for name, value, pattern in (
+            ('unit_ids', unit_ids, '[A-Z]+'),
+            ('firmware', firmware, r'\d+v\d+'),
+        ):
+            if not re.fullmatch(pattern, value):
+                raise InvalidInput(f'{name} = {value!r} is not allowed: {pattern} is needed')
         self._units = units
         self._unit = unit(units)
-        self._decimals = decimals
         self._firmware = firmware
         self._version = tuple(int(each) for each in firmware.split('v'))
-        self._full_scale = number('full_scale', full_scale, 'Pa', above=True)
-        self.valves = {each: Valve(time_constant) for each in unit_ids}
         self.locked: set[str] = set()
-        self.faults = FaultSchedule(self.FAULTS, schedule)
+        super().__init__(unit_ids, full_scale, time_constant, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the ID of the unit that answers and its reply; None if there is no such unit."""
@@ -352,10 +360,10 @@ class AlicatEmulator:
             return self._frame(address)
         if order == 'VE':
             return f'{address}   {self._firmware}.0-R24 Jan  2 2024,10:20:30'
-        if order.startswith('L') and self._version < (9, 0):
+        if order.startswith('L') and self._version < UNITS_SINCE:
             self.locked.add(address)
             return self._frame(address)
-        if order == 'LSS' and self._version >= (10, 5):
+        if order == 'LSS' and self._version >= SOURCE_SINCE:
             return f'{address} {"A" if has("analog_source", address) else "S"}'
         if order.split()[0] == 'LS':
             _, *words = order.split()
@@ -373,31 +381,27 @@ class AlicatEmulator:
         return '?'
 
     def _set(self, address: str, text: str) -> str:
-        valve = self.valves[address]
         try:
             setpoint = float(text) * self._unit
         except ValueError:
             return '?'
-        if self.faults.act('rejection', address) or not 0.0 <= setpoint <= self._full_scale:
+        if self.faults.act('rejection', address) or not 0.0 <= setpoint <= self.full_scale:
             return '?'
-        if self.faults.act('echo', address):
-            setpoint *= 0.5
-        if not self.faults.act('analog_source', address):
-            valve.setpoint = setpoint
+        self.follow(address, setpoint)
         return self._frame(address)
 
     def _frame(self, address: str) -> str:
         valve = self.valves[address]
-        status = [each for each in self.STATUS if self.faults.act(f'status={each}', address)]
+        status = [each for each in STATUS if self.faults.act(f'status={each}', address)]
         status += ['HLD'] * valve.held + ['LCK'] * (address in self.locked)
         numbers = f'{self._shown(valve.pressure)} {self._shown(valve.setpoint)}'
         return ' '.join([address, numbers, *status])
 
     def _shown(self, pressure: float) -> str:
-        return f'{pressure / self._unit:+0{self._decimals + 5}.{self._decimals}f}'
+        return f'{pressure / self._unit:+07.2f}'
 
 
-class SmcItvEmulator:
+class SmcItvEmulator(EmulatedDevice):
     """An SMC ITV on RS-232C, with the commands that two field programs use.
 
     Parameters
@@ -410,42 +414,28 @@ class SmcItvEmulator:
         See :class:`FaultSchedule`.
     """
 
-    FAULTS = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
     terminator = '\r\n'
 
     def __init__(
-        self,
-        full_scale: float = 100e3,
-        time_constant: float = 0.1,
-        schedule: Sequence[str] = (),
+        self, full_scale: float = 100e3, time_constant: float = 0.1, schedule: Sequence[str] = ()
     ) -> None:
-        self._count = number('full_scale', full_scale, 'Pa', above=True) / 1023.0
-        self.valve = Valve(time_constant)
-        self.faults = FaultSchedule(self.FAULTS, schedule)
+        super().__init__([''], full_scale, time_constant, schedule)
+        self._count = full_scale / FULL_COUNT
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return an empty address and the reply to one command."""
         order, *words = command.split() or ['']
-        setting = round(self.valve.setpoint / self._count)
-        rejected = self.faults.act('rejection')
-        if order == 'MON':
-            return '', str(round(self.valve.pressure / self._count))
-        if order == 'REQ':
-            return '', str(setting)
-        if order == 'SET' and len(words) == 1 and words[0].isdigit() and not rejected:
-            setting = min(int(words[0]), 1023)
-        elif order in ('INC', 'DEC') and not rejected:
-            setting = min(max(setting + (1 if order == 'INC' else -1), 0), 1023)
-        else:
+        value = self.valves[''].pressure if order == 'MON' else self.valves[''].setpoint
+        if order == 'SET':
+            if len(words) != 1 or not words[0].isdigit() or self.faults.act('rejection'):
+                return '', 'UNKNOWN COMMAND'
+            value = self.follow('', min(int(words[0]), FULL_COUNT) * self._count)
+        elif order not in ('MON', 'REQ'):
             return '', 'UNKNOWN COMMAND'
-        if self.faults.act('echo'):
-            setting //= 2
-        if not self.faults.act('analog_source'):
-            self.valve.setpoint = setting * self._count
-        return '', str(setting)
+        return '', str(round(value / self._count))
 
 
-class SerialTextEmulator:
+class SerialTextEmulator(EmulatedDevice):
     """A microcontroller board whose DACs drive SMC ITV, with the default lines of text.
 
     The reply to ``SET 1 2.500`` is ``OK 1 2.500``; the last number is the command voltage, 0 to
@@ -464,9 +454,6 @@ class SerialTextEmulator:
         See :class:`FaultSchedule`.
     """
 
-    FAULTS = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
-    terminator = '\n'
-
     def __init__(
         self,
         channels: int = 6,
@@ -474,35 +461,26 @@ class SerialTextEmulator:
         time_constant: float = 0.1,
         schedule: Sequence[str] = (),
     ) -> None:
-        if not 1 <= channels <= 99:
-            raise InvalidInput(
-                f'channels = {channels!r} is not allowed: a number from 1 to 99 is needed'
-            )
-        self._full_scale = number('full_scale', full_scale, 'Pa', above=True)
-        self.valves = {str(each + 1): Valve(time_constant) for each in range(channels)}
-        self.faults = FaultSchedule(self.FAULTS, schedule)
+        names = [str(each + 1) for each in range(integer('channels', channels, 1, 99))]
+        super().__init__(names, full_scale, time_constant, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the channel that a command names, and the reply to it."""
-        words = command.split()
-        order, channel = [*words, '', ''][:2]
+        order, channel, *values = [*command.split(), '', '']
         valve = self.valves.get(channel)
         if valve and order == 'READ':
-            return channel, f'{channel} {1.0 + 4.0 * valve.pressure / self._full_scale:.3f}'
+            return channel, f'{channel} {1.0 + 4.0 * valve.pressure / self.full_scale:.3f}'
         try:
-            volts = float(words[2])
+            volts = float(values[0])
         except (IndexError, ValueError):
             return channel, 'ERROR'
         if not valve or order != 'SET' or self.faults.act('rejection', channel):
             return channel, 'ERROR'
-        if self.faults.act('echo', channel):
-            volts *= 0.5
-        if not self.faults.act('analog_source', channel):
-            valve.setpoint = volts / 5.0 * self._full_scale
-        return channel, f'OK {channel} {volts:.3f}'
+        shown = self.follow(channel, volts / 5.0 * self.full_scale) / self.full_scale
+        return channel, f'OK {channel} {5.0 * shown:.3f}'
 
 
-EMULATORS: dict[str, type[AlicatEmulator | SmcItvEmulator | SerialTextEmulator]] = {
+EMULATORS: dict[str, Any] = {
     'alicat': AlicatEmulator,
     'smc_itv': SmcItvEmulator,
     'serial_text': SerialTextEmulator,

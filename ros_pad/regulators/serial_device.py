@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Regulators on a serial line: a thread polls the device; only open and close wait for it."""
+"""Regulators on a serial line: a thread of the port polls them; only open and close wait."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from ros_pad.configuration import choice, integer, number, text
 from ros_pad.errors import (
@@ -20,21 +23,22 @@ from ros_pad.errors import (
     TransportError,
 )
 from ros_pad.regulators.protocol import Reading, permitted
-from ros_pad.regulators.transport import (
-    FIRST_PAUSE,
-    LONGEST_PAUSE,
-    Bus,
-    PortLost,
-    Query,
-    SerialLine,
-    failure,
-)
 
 OPEN_PATIENCE = 1.0
 """Longest time for which ``open`` waits for a device to answer, s."""
 
 RETRY = 0.25
 """Time until a set-point that was refused or ignored is sent again, s."""
+
+LONGEST_REPLY = 256
+"""Longest reply, bytes; a longer one without a terminator is an error."""
+
+FIRST_PAUSE, LONGEST_PAUSE = 0.05, 1.0
+"""First and longest pause between attempts to reach a missing port or a lost device, s; each
+pause is twice as long as the one before."""
+
+QUIET = 0.02
+"""Pause after a failure, s, so that a late reply is not read as the next one."""
 
 UNITS = {
     'Pa': 1.0,
@@ -46,6 +50,226 @@ UNITS = {
     'psi': 6894.757293168361,
 }
 """Size of each unit of pressure, Pa, by name."""
+
+Query = Callable[..., str]
+"""Function that sends a command and returns its reply, both without terminator; with
+``reply=False`` it returns '' at once."""
+
+
+class PortLost(TransportError):
+    """The port is missing or cannot be opened; no device on it can be reached."""
+
+
+@dataclass(frozen=True)
+class SerialLine:
+    """A port and its settings: 8 data bits, no parity, 1 stop bit, lines of ASCII.
+
+    Parameters
+    ----------
+    port : str
+        Name of the serial port.
+    baudrate : int
+        1/s.
+    terminator : str
+        End of a line, in both directions.
+    reply_timeout : float
+        Longest time from the command to the end of its reply, s.
+    """
+
+    port: str
+    baudrate: int
+    terminator: str
+    reply_timeout: float
+
+    def error(self, kind: type[DeviceError], what: str, command: str, reply: Any) -> DeviceError:
+        """Return an error that names the problem, the port, the command and the reply."""
+        words = f'{what}: port {self.port}, command {command!r}, reply {reply!r}'
+        return kind(words, self.port, command, reply)
+
+
+class Bus:
+    """One port and its thread, which gives each device its turn, one command at a time.
+
+    Devices that share a port share its bus, which the first :meth:`join` opens and the last
+    :meth:`leave` closes. The next turn goes to the device with the earliest due time; a vent is
+    due at once and goes first. A port that is missing or cannot be opened is tried again, with
+    growing pauses.
+    """
+
+    _all: dict[str, Bus] = {}  # noqa: RUF012 all instances share this registry on purpose
+    _registry = threading.Lock()
+
+    def __init__(self, line: SerialLine) -> None:
+        self.line = line
+        self._changed = threading.Condition()
+        self._due: dict[SerialRegulator, float] = {}
+        self._closing = False
+        self._port: Any = None
+        self._thread = threading.Thread(
+            target=self._serve, name=f'serial port {line.port}', daemon=True
+        )
+
+    @classmethod
+    def join(cls, line: SerialLine, device: SerialRegulator) -> Bus:
+        """Add a device to the bus of a port, and return the bus.
+
+        Raises
+        ------
+        ConfigError
+            When the port is in use with other settings, or the address is taken.
+        TransportError
+            When pyserial is not installed.
+        """
+        try:
+            import serial  # noqa: F401 only serial devices need pyserial
+        except ModuleNotFoundError as error:
+            raise TransportError(
+                f'port {line.port} cannot be opened without pyserial: pip install pyserial, or'
+                ' apt install python3-serial'
+            ) from error
+        with cls._registry:
+            bus = cls._all.get(line.port)
+            if bus is None:
+                bus = cls._all[line.port] = cls(line)
+                bus._thread.start()
+            elif bus.line != line:
+                raise ConfigError(
+                    f'port {line.port} is open with {bus.line}: a regulator with {line} cannot'
+                    ' share it; give both the same settings'
+                )
+            with bus._changed:
+                if any(other.address == device.address for other in bus._due):
+                    raise ConfigError(
+                        f'port {line.port} has a device {device.address!r} already: each'
+                        ' regulator on a bus needs an address of its own'
+                    )
+                bus._due[device] = -math.inf
+                bus._changed.notify_all()
+        return bus
+
+    def leave(self, device: SerialRegulator) -> None:
+        """Remove a device; close the port after the last one."""
+        with self._registry:
+            with self._changed:
+                self._due.pop(device, None)
+                self._closing = not self._due
+                self._changed.notify_all()
+            if self._closing:
+                del self._all[self.line.port]
+                # A turn in progress ends at its timeouts at the latest.
+                self._thread.join()
+
+    def schedule(self, device: SerialRegulator, at: float) -> None:
+        """Schedule the next turn of a device, unless it is due earlier.
+
+        Parameters
+        ----------
+        device : SerialRegulator
+            On this bus; any other one is ignored.
+        at : float
+            s, monotonic clock; ``-inf`` for a turn before all other devices.
+        """
+        with self._changed:
+            if device in self._due:
+                self._due[device] = min(self._due[device], at)
+                self._changed.notify_all()
+
+    def query(self, command: str, reply: bool = True) -> str:
+        """Send a command and return its reply; only the thread of the bus may call it.
+
+        Raises
+        ------
+        TransportError
+            When there is no reply in time, or only a part of one.
+        ProtocolError
+            When bytes were received before the command, or the reply is not ASCII or has no
+            terminator.
+        PortLost
+            When the port is missing.
+        """
+        line, what = self.line, ''
+        kind: type[DeviceError] = ProtocolError
+        end = line.terminator.encode()
+        try:
+            answer: bytes = self._port.read(self._port.in_waiting)
+            if answer:
+                what = 'bytes were received before the command was sent'
+            else:
+                self._port.write(command.encode() + end)
+                answer = self._port.read_until(end, LONGEST_REPLY) if reply else end
+                if answer.endswith(end) and answer.isascii():
+                    return answer.removesuffix(end).decode().strip()
+                if answer.endswith(end):
+                    what = 'the reply is not ASCII'
+                elif len(answer) >= LONGEST_REPLY:
+                    what = 'the reply has no terminator'
+                else:
+                    kind = TransportError
+                    what = f'{"half a line" if answer else "no reply"} within'
+                    what += f' {line.reply_timeout:g} s'
+            time.sleep(QUIET)
+            self._port.read(self._port.in_waiting)
+        except Exception as error:  # pyserial raises many types when a device disappears
+            raise PortLost(
+                f'port {line.port} is missing: {error}: command {command!r}, reply none'
+            ) from error
+        raise line.error(kind, what, command, answer)
+
+    def _open(self) -> None:
+        import serial
+
+        line = self.line
+        try:
+            self._port = serial.Serial(
+                line.port,
+                line.baudrate,
+                timeout=line.reply_timeout,
+                write_timeout=line.reply_timeout,
+                exclusive=True,  # a second program would take some of the replies
+            )
+        except Exception as error:  # pyserial raises errors of many types here, too
+            raise PortLost(
+                f'port {line.port} cannot be opened: {error}: pad doctor lists the ports'
+            ) from error
+
+    def _close(self) -> None:
+        if self._port is not None:
+            with contextlib.suppress(OSError):  # the port may be missing
+                self._port.close()
+            self._port = None
+
+    def _next(self) -> SerialRegulator | None:
+        """Wait until a device is due and return it; None when the bus is closed."""
+        with self._changed:
+            while not self._closing:
+                device = min(self._due, key=self._due.__getitem__, default=None)
+                wait = self._due[device] - time.monotonic() if device else math.inf
+                if device and wait <= 0.0:
+                    self._due[device] = math.inf
+                    return device
+                self._changed.wait(wait if wait < math.inf else None)
+        return None
+
+    def _serve(self) -> None:
+        pause = FIRST_PAUSE
+        while (device := self._next()) is not None:
+            try:
+                if self._port is None:
+                    self._open()
+                due = device.take_turn(self.query)
+                pause = FIRST_PAUSE
+            except PortLost as error:
+                self._close()
+                with self._changed:
+                    devices = list(self._due)
+                for each in devices:
+                    each.lose_port(error)
+                with self._changed:
+                    self._changed.wait_for(lambda: self._closing, pause)
+                pause = min(2.0 * pause, LONGEST_PAUSE)
+                due = -math.inf
+            self.schedule(device, due)
+        self._close()
 
 
 @dataclass(frozen=True)
@@ -122,16 +346,9 @@ class SerialRegulator(ABC):
         self._line = line
         self._address = address
         self._bus: Bus | None = None
-        # This lock guards the attributes below, which the thread of the bus uses too.
+        # This lock guards what _reset() sets, which the thread of the bus uses too.
         self._changed = threading.Condition()
-        self._requested: float | None = None  # None leaves the set-point of the device as it is
-        self._confirmed = False
-        self._frame: Frame | None = None  # None while the device is lost or not yet identified
-        self._error: PadError | None = None  # error of the last turn
-        self._refusal = ''
-        self._unconfirmed = False  # whether the last set-point was sent without an answer
-        self._retry_at = -math.inf
-        self._pause = FIRST_PAUSE  # used by the thread only
+        self._reset()
 
     # --- what a backend implements, called by the thread of the bus ----------------------------
 
@@ -153,17 +370,9 @@ class SerialRegulator(ABC):
             When the device refuses it.
         """
 
-    def protocol_error(self, what: str, command: str, reply: str) -> ProtocolError:
-        """Return the error for a reply that the protocol does not allow."""
-        error = failure(ProtocolError, what, self._line, command, reply)
-        assert isinstance(error, ProtocolError)
-        return error
-
-    def device_fault(self, what: str, command: str, reply: str) -> DeviceFault:
-        """Return the error for a command that the device refuses."""
-        error = failure(DeviceFault, what, self._line, command, reply)
-        assert isinstance(error, DeviceFault)
-        return error
+    def error(self, kind: type[DeviceError], what: str, command: str, reply: str) -> DeviceError:
+        """Return an error that names the problem, the port, the command and the reply."""
+        return self._line.error(kind, what, command, reply)
 
     # --- the regulator protocol ----------------------------------------------------------------
 
@@ -189,29 +398,31 @@ class SerialRegulator(ABC):
         """
         if self._bus is not None:
             return
-        with self._changed:
-            self._requested, self._frame, self._error = None, None, None
-            self._confirmed = self._unconfirmed = False
-            self._refusal = ''
-            self._retry_at = -math.inf
-            self._pause = FIRST_PAUSE
+        self._reset()
         self._bus = Bus.join(self._line, self)
         with self._changed:
             self._changed.wait_for(
-                lambda: self._frame or (self._error and not temporary(self._error)),
+                lambda: self._frame or isinstance(self._error, (ConfigError, DeviceFault)),
                 OPEN_PATIENCE,
             )
-            met = self._frame is not None
-            error = self._error
-        if not met:
+            known, error = self._frame, self._error
+        if not known:
             self._leave()
-            raise copied(
-                error
-                or TransportError(
-                    f'port {self._line.port}: regulator {self._address!r} did not answer within'
-                    f' {OPEN_PATIENCE:g} s'
-                )
+            raise error or TransportError(
+                f'port {self._line.port}: regulator {self._address!r} did not answer within'
+                f' {OPEN_PATIENCE:g} s'
             )
+
+    def _reset(self) -> None:
+        """Forget the device."""
+        self._requested: float | None = None  # None leaves the set-point of the device as it is
+        self._confirmed = False
+        self._frame: Frame | None = None  # None while the device is lost or not yet identified
+        self._error: PadError | None = None  # error of the last turn
+        self._refusal = ''
+        self._unconfirmed = False  # whether the last set-point was sent without an answer
+        self._retry_at = -math.inf
+        self._pause = FIRST_PAUSE  # used by the thread only
 
     def set_pressure(self, gauge_pa: float) -> None:
         """Request a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``.
@@ -278,7 +489,7 @@ class SerialRegulator(ABC):
             vented, error, refusal = self._confirmed, self._error, self._refusal
         self._leave()
         if not vented:
-            kind = type(copied(error)) if error else DeviceFault
+            kind = DeviceFault if error is None else type(error)
             why = error or refusal or 'its bus was busy'
             raise kind(f'closed without a confirmed vent: port {self._line.port}: {why}')
 
@@ -312,7 +523,7 @@ class SerialRegulator(ABC):
             return self._frame
         self._lose()
         if self._error:
-            raise copied(self._error)
+            raise self._error.with_traceback(None)  # else each time would extend it
         raise TransportError(
             f'port {self._line.port}: no frame of regulator {self._address!r} for {age:.3g} s'
         )
@@ -411,19 +622,6 @@ class SerialRegulator(ABC):
         self._unconfirmed = True
         if self._requested is not None:
             self._request(0.0)
-
-
-def temporary(error: PadError) -> bool:
-    """Return whether the next attempt may succeed after an error."""
-    return isinstance(error, (TransportError, ProtocolError))
-
-
-def copied(error: PadError) -> PadError:
-    """Return a copy of an error, because raising one object repeatedly extends its traceback."""
-    kind = TransportError if isinstance(error, PortLost) else type(error)
-    if isinstance(error, DeviceError):
-        return kind(str(error), error.port, error.command, error.reply)
-    return kind(*error.args)
 
 
 def unit(name: str) -> float:

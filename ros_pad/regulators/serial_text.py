@@ -7,10 +7,9 @@ import math
 import re
 
 from ros_pad.configuration import integer, number, text
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import DeviceFault, InvalidInput, ProtocolError
 from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.serial_device import Frame, SerialRegulator
-from ros_pad.regulators.transport import Query, SerialLine
+from ros_pad.regulators.serial_device import Frame, Query, SerialLine, SerialRegulator
 
 _VALUE = r'[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?'
 _FIELD = re.compile(r'\{(channel|value(?::(?:\.(\d)f|d))?)\}')
@@ -83,7 +82,10 @@ class SerialTextRegulator(SerialRegulator):
         silence: float = 0.5,
     ) -> None:
         integer('channel', channel, 0, 99)
-        _check_terminator(terminator)
+        if not text('terminator', terminator).isascii() or not 1 <= len(terminator) <= 4:
+            raise InvalidInput(
+                f'terminator = {terminator!r} is not allowed: 1 to 4 ASCII characters are needed'
+            )
         for name, template, values in [
             ('set_template', set_template, (1,)),
             ('set_reply', set_reply, (0, 1)),
@@ -121,14 +123,11 @@ class SerialTextRegulator(SerialRegulator):
         """Request the measured value; return a frame."""
         reply = query(self._read_command)
         found = self._read_reply.fullmatch(reply)
-        if not found:
-            raise self.protocol_error(
-                'the reply does not match read_reply', self._read_command, reply
-            )
         zero, span = self._monitor
-        pressure = (float(found['value']) - zero) / span * self._full_scale
+        pressure = (float(found['value']) - zero) / span * self._full_scale if found else math.nan
         if not math.isfinite(pressure):  # the pattern accepts 1e999, which is infinite
-            raise self.protocol_error('the value is not finite', self._read_command, reply)
+            what = 'the reply does not match read_reply with a finite value'
+            raise self.error(ProtocolError, what, self._read_command, reply)
         return Frame(pressure, self._in_force, self._resolution)
 
     def send(self, query: Query, setpoint: float) -> None:
@@ -141,12 +140,12 @@ class SerialTextRegulator(SerialRegulator):
         if self._set_reply:
             found = self._set_reply.fullmatch(reply)
             if not found:
-                raise self.device_fault('the reply does not match set_reply', command, reply)
+                what = 'the reply does not match set_reply'
+                raise self.error(DeviceFault, what, command, reply)
             echo = float(found.groupdict().get('value', value))
             if not abs(echo - float(value)) < 0.5 * 10.0**-self._decimals:
-                raise self.device_fault(
-                    f'value {value} was sent, {echo:g} is in force', command, reply
-                )
+                what = f'value {value} was sent, {echo:g} is in force'
+                raise self.error(DeviceFault, what, command, reply)
         self._in_force = setpoint
 
 
@@ -154,11 +153,6 @@ def _decimals(set_template: str, command_zero: float) -> int:
     """Return the decimals of the value in a template, which must express a vent exactly."""
     values = [each[2] for each in _FIELD.finditer(set_template) if each[1] != 'channel']
     decimals = int(values[0] or 0)
-    if '{value}' in set_template:
-        raise InvalidInput(
-            f'set_template = {set_template!r} is not allowed: the number of decimals is missing,'
-            ' {value:.3f} or {value:d} is needed'
-        )
     if round(command_zero, decimals) != command_zero:
         raise InvalidInput(
             f'command_zero = {command_zero!r} is not allowed: set_template has {decimals}'
@@ -176,13 +170,6 @@ def _scale(name: str, zero: float, full: float) -> tuple[float, float]:
             f'{name}_full = {full!r} is not allowed: it must differ from {name}_zero'
         )
     return low, high - low
-
-
-def _check_terminator(terminator: str) -> None:
-    if not text('terminator', terminator).isascii() or not 1 <= len(terminator) <= 4:
-        raise InvalidInput(
-            f'terminator = {terminator!r} is not allowed: 1 to 4 ASCII characters are needed'
-        )
 
 
 def _check(name: str, template: str, values: tuple[int, ...]) -> None:

@@ -37,7 +37,7 @@ class SimulatedRegulator:
         Measured sonic conductance of the whole line, m³/(s Pa), instead of the hose formula.
     pad_volume : float or callable
         Air volume of the pads and their chamber, m³, or a function of the gauge pressure, Pa.
-    natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit : float
+    natural_frequency, damping, dead_time, dead_band, full_scale, quantum : float
         As for :class:`ros_pad.simulation.RegulatorModel`.
     sensor_resolution : float
         Smallest step of readings, Pa, 0.1 to 1000. With whole Pa an ambient pressure of
@@ -99,14 +99,13 @@ class SimulatedRegulator:
         dead_band: float = 0.005,
         full_scale: float = 100e3,
         quantum: float = 100.0,
-        slew_limit: float = math.inf,
         sensor_resolution: float = 10.0,
         sensor_noise: float = 0.0,
         seed: int = 0,
         faults: Sequence[Fault | str] = (),
     ) -> None:
         model = RegulatorModel(
-            natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit
+            natural_frequency, damping, dead_time, dead_band, full_scale, quantum
         )
         self._ceiling = number('ceiling', ceiling, 'Pa', 1.0, full_scale)
         self._resolution = number('sensor_resolution', sensor_resolution, 'Pa', 0.1, 1000.0)
@@ -119,8 +118,7 @@ class SimulatedRegulator:
         self._faults = parsed(faults)
         self._channel = PneumaticChannel(model, hose, pad_volume, faults=self._faults)
         self._copy, self._copied = self._channel, -math.inf  # of which time it is, s
-        self._disturbance = 0.0
-        self._disturbance_time = -math.inf
+        self._disturbance = (-math.inf, 0.0)  # time, s, and noise, Pa
         self._is_open = False
         self._now = 0.0  # time of the last call
         self._rest = 0.0  # time since the last internal step, s
@@ -188,12 +186,12 @@ class SimulatedRegulator:
         pressure = channel.pad_pressure
         if self._faults:
             self._check_answer(self._now)
-            pressure += self._drift()
+            acting = [each for each in self._faults if each.acts_at(self._now)]
+            pressure += condition(acting, self._now, channel.regulator.full_scale).offset
         if self._noise:
-            if self._now != self._disturbance_time:
-                self._disturbance_time = self._now
-                self._disturbance = self._random.gauss(0.0, self._noise)
-            pressure += self._disturbance
+            if self._now != self._disturbance[0]:
+                self._disturbance = self._now, self._random.gauss(0.0, self._noise)
+            pressure += self._disturbance[1]
         return Reading(self._shown(pressure), channel.setpoint, (), self._now)
 
     def vent(self) -> None:
@@ -208,11 +206,6 @@ class SimulatedRegulator:
 
     def _shown(self, pressure: float) -> float:
         return round(pressure / self._resolution) * self._resolution
-
-    def _drift(self) -> float:
-        """Return the present offset of the sensor of the device, Pa."""
-        acting = [each for each in self._faults if each.acts_at(self._now)]
-        return condition(acting, self._now, self._channel.regulator.full_scale).offset
 
     def _check_answer(self, now: float) -> None:
         """Raise the error of a device that does not answer, during such a fault."""

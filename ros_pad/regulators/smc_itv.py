@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from ros_pad.configuration import number
+from ros_pad.errors import DeviceFault, ProtocolError
 from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.serial_device import Frame, SerialRegulator
-from ros_pad.regulators.transport import Query, SerialLine
+from ros_pad.regulators.serial_device import Frame, Query, SerialLine, SerialRegulator
 
 FULL_COUNT = 1023
 """Setting at full scale: 10 bits."""
@@ -68,16 +68,14 @@ class SmcItvRegulator(SerialRegulator):
         command = f'SET {setting}'
         echo = self._query_count(query, command)
         if echo != setting:
-            raise self.device_fault(
-                f'setting {setting} was sent, {echo} is in force', command, str(echo)
-            )
+            what = f'setting {setting} was sent, {echo} is in force'
+            raise self.error(DeviceFault, what, command, str(echo))
 
     def _query_count(self, query: Query, command: str) -> int:
         reply = query(command)
         if reply == 'UNKNOWN COMMAND':
-            raise self.device_fault('the device rejected the command', command, reply)
+            raise self.error(DeviceFault, 'the device rejected the command', command, reply)
         if not reply.isdecimal() or int(reply) > FULL_COUNT:
-            raise self.protocol_error(
-                f'the reply is not a whole number from 0 to {FULL_COUNT}', command, reply
-            )
+            what = f'the reply is not a whole number from 0 to {FULL_COUNT}'
+            raise self.error(ProtocolError, what, command, reply)
         return int(reply)

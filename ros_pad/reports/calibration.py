@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of a calibration: measurements, the model, and the residuals."""
+"""The picture of a calibration: what was measured beside the model, and the residuals."""
 
 from __future__ import annotations
 
@@ -23,16 +23,14 @@ _MARKS = {'height': 'o', 'depth': 'v', 'contact_radius': 's', 'gap': '^', 'force
 
 def draw(calibration: Calibration) -> Figure:
     """Return the picture: one column for each kind of measurement, fit above, residuals below."""
-    rows: dict[str, list[Residual]] = {'shape': [], 'force limit': [], 'friction': []}
-    names = {'force_limit': 'force limit', 'tangential_force': 'friction'}
+    rows: dict[str, list[Residual]] = {}
     for row in calibration.residuals:
-        rows[names.get(row.quantity, 'shape')].append(row)
-    kinds = [kind for kind, found in rows.items() if found]
+        kind = {'force_limit': 'force limit', 'tangential_force': 'friction'}.get(row.quantity)
+        rows.setdefault(kind or 'shape', []).append(row)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.6 * len(kinds), 6.2), layout='constrained')
-        panels = figure.subplots(2, len(kinds), squeeze=False, height_ratios=[3, 2])
-        for kind, above, below in zip(kinds, *panels, strict=True):
-            found = rows[kind]
+        figure = Figure(figsize=(4.6 * len(rows), 6.2), layout='constrained')
+        panels = figure.subplots(2, len(rows), squeeze=False, height_ratios=[3, 2])
+        for (kind, found), above, below in zip(rows.items(), *panels, strict=True):
             above.set_title(kind)
             if kind == 'shape' and len(calibration.measurements.free.pressure):
                 _shape(calibration, above)
@@ -47,16 +45,14 @@ def draw(calibration: Calibration) -> Figure:
                 above.set(xlabel=f'measured, {unit}', ylabel=f'model, {unit}')
             above.legend(loc='upper left')
             below.axhline(0.0, color=PALE, lw=1, zorder=0)
-            below.set(ylabel='model over measured − 1, %')
-            if kind == 'friction':
-                _points(below, found, [(r.measured, 100.0 * r.error) for r in found])
-                below.set(xlabel='measured tangential force, N')
-            else:
-                _points(below, found, [(r.pressure / 1e3, 100.0 * r.error) for r in found])
-                below.set(xlabel='gauge pressure, kPa')
+            friction = kind == 'friction'
+            places = [r.measured if friction else r.pressure / 1e3 for r in found]
+            errors = [100.0 * r.error for r in found]
+            _points(below, found, list(zip(places, errors, strict=True)))
+            x = 'measured tangential force, N' if friction else 'gauge pressure, kPa'
+            below.set(xlabel=x, ylabel='model over measured − 1, %')
             if kind == 'shape':
-                title = {'title': 'filled: fitted', 'title_fontsize': 7.5}
-                below.legend(loc='best', fontsize=7.5, **title)
+                below.legend(title='filled: fitted', title_fontsize=7.5, fontsize=7.5)
     return figure
 
 
@@ -64,26 +60,19 @@ def _points(panel: Axes, rows: Sequence[Residual], points: Sequence[tuple[float,
     """Draw a point for each row, with one entry of the legend for each look."""
     seen = set()
     for row, point in zip(rows, points, strict=True):
-        look = _look(row)
-        if look['label'] in seen:
-            del look['label']
+        first, *words = row.setting.split(', ')
+        if row.quantity == 'tangential_force':
+            first, dry = first.split()[0], words[0] == 'dry'
+            mark, filled, label = 'o' if dry else 's', not dry, f'{first}, {words[0]}'
         else:
-            seen.add(look['label'])
-        panel.plot(*point, ls='', **look)
-
-
-def _look(row: Residual) -> dict[str, Any]:
-    first, *words = row.setting.split(', ')
-    if row.quantity == 'tangential_force':
-        first, dry = first.split()[0], words[0] == 'dry'
-        mark, filled, label = 'o' if dry else 's', not dry, f'{first}, {words[0]}'
-    else:
-        mark, filled = _MARKS[row.quantity], row.used
-        name = row.quantity.replace('_', ' ')
-        label = name if not words else f'{name}, {"free" if first == "free" else "pressed"}'
-    colour = BLUE if first == 'domes' or 'pressed' in label else VERMILION
-    fill = 'full' if filled else 'none'
-    return {'color': colour, 'marker': mark, 'fillstyle': fill, 'label': label}
+            mark, filled = _MARKS[row.quantity], row.used
+            label = row.quantity.replace('_', ' ')
+            if words:
+                label += ', free' if first == 'free' else ', pressed'
+        colour = BLUE if first == 'domes' or 'pressed' in label else VERMILION
+        look: dict[str, Any] = {'fillstyle': 'full' if filled else 'none', 'color': colour}
+        panel.plot(*point, mark, **look, label='_' if label in seen else label)
+        seen.add(label)
 
 
 def _shape(calibration: Calibration, panel: Axes) -> None:
@@ -91,11 +80,9 @@ def _shape(calibration: Calibration, panel: Axes) -> None:
     free, pad = calibration.measurements.free, calibration.foot.pad
     pressure = np.linspace(0.0, 1.05 * float(free.pressure.max()), 300)
     k = calibration.constants[0]
-    label = {
-        'stiffness': f'model, k = {k.value:.4g} N/m',
-        'factor': f'{k.value:.3g} × the material',
-        'thickness': f'the material, {1e3 * k.value:.3g} mm thick',
-    }[k.name]
+    label = f'model, k = {k.value:.4g} N/m'
+    if k.name == 'factor':
+        label = f'{k.value:.3g} × the material'
     heights = 1e3 * _heights(pad, k.name, k.value, pressure)
     panel.plot(pressure / 1e3, heights, color=BLUE, label=label)
     if not math.isnan(k.low):

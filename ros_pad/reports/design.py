@@ -12,32 +12,19 @@ from matplotlib.figure import Figure
 
 from ros_pad.contact import Design, rise_height
 from ros_pad.contact.candidates import Candidate, Span
-from ros_pad.contact.design import DOME
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import write_picture
 from ros_pad.reports.style import BLACK, BLUE, VERMILION, WIDE
 
 
 def draw(path: str | os.PathLike[str], designs: Sequence[Design]) -> None:
-    """Draw designs for one sole and load over the pad radius.
+    """Draw the load and the rise of designs for one sole and load over the pad radius.
 
-    Parameters
-    ----------
-    path : path
-        Ends in .png, .svg or .pdf. An existing file is replaced.
-    designs : sequence of Design
-        Results of :func:`ros_pad.contact.design` for rising radii.
-
-    Raises
-    ------
-    InvalidInput
-        When the path has another ending, or no pad of the drawn radii fits on the sole.
+    ``designs`` are for rising radii, and the path ends in .png, .svg or .pdf. Raises InvalidInput
+    without designs.
     """
     if not designs:
-        raise InvalidInput(
-            'the sole is too small: no pad with a radius from 0.3 to 2.5 mm fits on it; leave out'
-            ' --figure'
-        )
+        raise InvalidInput('--figure: no pad with a radius from 0.3 to 2.5 mm fits on the sole')
 
     def figure() -> Figure:
         drawn = Figure(figsize=(WIDE, 3.2), layout='constrained')
@@ -50,7 +37,7 @@ def draw(path: str | os.PathLike[str], designs: Sequence[Design]) -> None:
         loads.set(yscale='log', ylabel='load of the foot, N', title='(a) what a sole carries')
         # Use ideal cells: the cells of a design vary, because its number of pads is rounded.
         heights.plot(1e3 * r, 1e3 * rise_height(r), color=BLUE, lw=1.8, label='height of rise')
-        heights.plot(1e3 * r, 2e3 * DOME * r, color=BLACK, lw=1.0, ls=':', label='gap full')
+        heights.plot(1e3 * r, 3e3 * r, color=BLACK, lw=1.0, ls=':', label='gap full')
         heights.set(ylabel='height of rise, mm', title='(b) liquid between the domes')
         for axes in (loads, heights):
             axes.set(xlim=(0.0, 2.5), xlabel='radius of the pads, mm')
@@ -65,14 +52,7 @@ def draw_candidates(
 ) -> None:
     """Draw needed and largest pressures of pads of materials, and heights of their domes.
 
-    Parameters
-    ----------
-    path : path
-        Ends in .png, .svg or .pdf. An existing file is replaced.
-    found : sequence of Candidate
-        The pads.
-    ceiling : float
-        Highest pressure of the supply, Pa gauge.
+    ``ceiling`` is that of the supply, Pa gauge; the path ends in .png, .svg or .pdf.
     """
 
     def figure() -> Figure:
@@ -103,11 +83,10 @@ def draw_candidates(
 
 def _bar(axes: Axes, scale: float, span: Span, place: float, colour: str, mark: str) -> None:
     """Draw a value and its interval; the lowest one, hollow, where the value is infinite."""
-    value, low, high = (scale * each for each in span)
-    if np.isfinite(low):
-        right = high if np.isfinite(high) else value
-        if np.isfinite(right):
-            axes.plot([low, right], [place, place], color=colour, lw=1.4)
-        fill = 'full' if np.isfinite(value) else 'none'
-        at = value if np.isfinite(value) else low
+    finite = [scale * each for each in span if np.isfinite(each)]
+    if finite:
+        axes.plot([min(finite), max(finite)], [place, place], color=colour, lw=1.4)
+        known = np.isfinite(span.value)
+        at = scale * span.value if known else min(finite)
+        fill = 'full' if known else 'none'
         axes.plot(at, place, mark, color=colour, ms=4.0, fillstyle=fill)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -44,10 +44,9 @@ LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
 STATES = ('flat, dry', 'flat, wet', 'dome, dry', 'dome, wet')
 NOTE = (
     'Friction rests on assumed constants, each of which may be wrong by a factor of two:'
-    ' docs/assumptions.md. The points on the drawing of the force limit are all criteria that the'
-    ' pads have.'
+    ' docs/assumptions.md.'
 )
-_LOADS, _PRESSURES = 30, 61  # points of the curves
+_LOADS = 30  # points of the curves
 _TICK, _LONGEST = 1e-3, 5.0  # s, see time_to
 
 
@@ -57,7 +56,7 @@ class Field(NamedTuple):
     Attributes
     ----------
     name, label : str
-        Of the attribute of :class:`Inputs`, and on the page.
+        In the inputs, and on the page.
     setting : Setting
         What is allowed, SI.
     low, high, step : float
@@ -75,13 +74,19 @@ class Field(NamedTuple):
     shown: str
     unit: float
 
-    def check(self, value: float | None) -> None:
-        """Raise InvalidInput, in the unit of the page, if a value in SI is not allowed."""
+    def read(self, value: float | None) -> float:
+        """Return a value in SI in the unit of the page; NaN for none."""
+        if value is None or math.isnan(value):
+            return math.nan
+        return value if self.unit == 1 else float(f'{value / self.unit:.12g}')
+
+    def check(self, value: float) -> None:
+        """Raise InvalidInput if a value in the unit of the page is not allowed."""
         low, high = self.setting.low / self.unit, self.setting.high / self.unit
         allowed = replace(self.setting, low=low, high=high, unit=self.shown)
-        if value is None or math.isnan(value):
+        if math.isnan(value):
             raise InvalidInput(f'{allowed.name} is missing: {allowed.allowed} is needed')
-        allowed.accept(value if self.unit == 1 else float(f'{value / self.unit:.12g}'))
+        allowed.accept(value)
 
 
 def _of(settings: Sequence[Setting], name: str, new: str = '') -> Setting:
@@ -111,55 +116,31 @@ FIELDS = (
 _BLAMED = {'ceiling': 'supply', 'limit': 'criterion', 'setpoint': 'pressure', 'force': 'load'}
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """What is chosen, SI; the foot has what cannot be chosen here. See :data:`FIELDS`.
+Inputs: TypeAlias = dict[str, Any]
+"""What is chosen, SI, by name of :data:`FIELDS`, with ``foot`` (the foot to begin with, which has
+what cannot be chosen here), ``material`` (:data:`MEASURED` or a material), ``criterion`` of the
+force limit and ``liquid`` of :data:`LIQUIDS`."""
 
-    Attributes
-    ----------
-    foot : Foot
-        The foot to begin with.
-    material, criterion, liquid : str
-        :data:`MEASURED` or a material; a criterion of the force limit; of :data:`LIQUIDS`.
-    """
 
-    foot: Foot
-    material: str
-    criterion: str
-    liquid: str
-    pads: int
-    radius: float
-    stiffness: float
-    thickness: float | None
-    sole_radius: float
-    supply: float
-    pressure: float
-    load: float
-    film: float = 3e-4
-    stand: float = 0.3
-    roughness: float = 0.0
-    bore: float = 4e-3
-    hose: float = 1.0
-
-    @classmethod
-    def of(cls, foot: Foot) -> Inputs:
-        """Return the values of a foot, at a typical pressure and half the load for that."""
-        pad, pressure = foot.pad, DOMED * foot.ceiling
-        load = 0.5 * foot.dome_load(math.inf, pressure)
-        return cls(
-            foot,
-            MEASURED if pad.material is None else pad.material.name,
-            foot.limit,
-            'water',
-            foot.pads,
-            pad.radius,
-            pad.stiffness,
-            pad.thickness,
-            foot.sole_radius,
-            foot.ceiling,
-            pressure,
-            float(f'{load:.2g}') or 1.0,
-        )
+def inputs_of(foot: Foot) -> Inputs:
+    """Return the values of a foot, at a typical pressure and half the load for that."""
+    pad, pressure = foot.pad, DOMED * foot.ceiling
+    load = float(f'{0.5 * foot.dome_load(math.inf, pressure):.2g}') or 1.0
+    return {
+        'foot': foot,
+        'material': MEASURED if pad.material is None else pad.material.name,
+        'criterion': foot.limit,
+        'liquid': 'water',
+        'pads': foot.pads,
+        'radius': pad.radius,
+        'stiffness': pad.stiffness,
+        'thickness': pad.thickness,
+        'sole_radius': foot.sole_radius,
+        'supply': foot.ceiling,
+        'pressure': pressure,
+        'load': load,
+        **{'film': 3e-4, 'stand': 0.3, 'roughness': 0.0, 'bore': 4e-3, 'hose': 1.0},
+    }
 
 
 class Remark(NamedTuple):
@@ -179,7 +160,7 @@ class Switching(NamedTuple):
 
 @dataclass(frozen=True)
 class Explored:
-    """The answer to :class:`Inputs`; parts without an answer are None.
+    """The answer to inputs; parts without an answer are None.
 
     Attributes
     ----------
@@ -187,42 +168,40 @@ class Explored:
         At most one error for each input.
     foot : Foot
         The foot, on smooth ground, as it is exported.
-    pad, free, pressed, ring
-        The pad, its dome free and under its share of the load, and the ring of liquid.
+    free, pressed, ring
+        The dome free and under its share of the load, and the ring of liquid.
     limits : dict of str to float
         Force limit of one pad by criterion, N; NaN above the largest pressure of a criterion.
-    limit : float
-        Force limit of the foot, N.
-    limit_curve : tuple of array
-        Pressures up to the ceiling, Pa, and the limit of the foot there, N.
-    grip : dict of str to float
-        Tangential capacity at the load, N, by state.
     loads, curves
-        Loads, N, and the capacity there, N, by state.
+        Loads, N, and the tangential capacity there, N, by state; the last is the present load.
     switching : Switching
-    places : array
-        Centres of the pads, m, as rows.
-    pitch, touching : float
-        Distance of neighbouring pads, m; share of a flat sole that touches.
+    pitch : float
+        Distance of neighbouring pads in a hexagonal pattern over the sole, m.
     """
 
     inputs: Inputs
     remarks: tuple[Remark, ...]
-    pad: Pad | None
     foot: Foot | None
     free: Inflated | None
     pressed: Pressed | None
     ring: Meniscus | None
     limits: Mapping[str, float]
-    limit: float | None
-    limit_curve: tuple[Array, Array] | None
-    grip: Mapping[str, float]
     loads: Array
     curves: Mapping[str, Array]
     switching: Switching | None
-    places: Array | None
     pitch: float
-    touching: float
+
+    @property
+    def grip(self) -> dict[str, float]:
+        """Tangential capacity at the load, N, by state."""
+        return {state: float(curve[-1]) for state, curve in self.curves.items()}
+
+    @property
+    def limit(self) -> float | None:
+        """Force limit of the foot, N."""
+        if self.foot is None or not self.limits:
+            return None
+        return self.foot.pads * self.limits[self.foot.limit]
 
 
 class _Parts:
@@ -263,44 +242,36 @@ def explore(inputs: Inputs) -> Explored:
     """Compute everything that the page shows."""
     parts = _Parts()
     # A material has its stiffness from its law; pads without one need no thickness.
-    unused = 'stiffness' if inputs.material != MEASURED else 'thickness'
+    unused = 'stiffness' if inputs['material'] != MEASURED else 'thickness'
     for field in FIELDS:
-        value = getattr(inputs, field.name)
+        value = inputs[field.name]
         if field.name != unused or (unused == 'thickness' and value is not None):
-            parts('', lambda field=field, value=value: field.check(value))
+            parts('', field.check, field.read(value))
+    pressure = inputs['pressure']
     pad = parts('radius stiffness thickness', _pad, inputs)
     criterion = parts('', _criterion, inputs, pad, parts)
     foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)
     parts('pressure', _below_ceiling, inputs, foot)
-    free = parts('pressure', lambda pad: inflate(pad, inputs.pressure), pad)
-    around = functools.partial(_places, inputs, free, parts)
-    places, pitch = parts('pads sole_radius radius', around) or (None, math.nan)
-    limits = parts('pressure', _limits, pad, inputs.pressure) or {}
-    limit = parts('pressure', _limit, inputs, foot, limits, parts)
+    free = parts('pressure', inflate, pad, pressure)
+    around = functools.partial(_pitch, inputs, free, parts)
+    pitch = parts('pads sole_radius radius', around)
+    limits = parts('pressure', _limits, pad, pressure) or {}
+    parts('pressure', _within_limit, inputs, foot, limits, parts)
     loads, curves = parts('load', _curves, inputs, foot, limits, parts) or (np.zeros(1), {})
-    touching = parts('load roughness', _touching, inputs, foot) or 0.0
-    share = parts('load pads', lambda: inputs.load / inputs.pads)
-    pressed = parts('pressure', press, pad, inputs.pressure, share)
-    ring = parts('', _ring, inputs, pressed, parts)
-    switching = parts('pressure bore hose', _switched, inputs, foot, parts)
+    share = parts('load pads', lambda: inputs['load'] / inputs['pads'])
+    pressed = parts('pressure', press, pad, pressure, share)
     return Explored(
         inputs=inputs,
-        remarks=tuple(parts.remarks),
-        pad=pad,
         foot=foot,
         free=free,
         pressed=pressed,
-        ring=ring,
+        ring=parts('', _ring, inputs, pressed, parts),
         limits=limits,
-        limit=limit,
-        limit_curve=None if foot is None else _limit_curve(foot),
-        grip={state: float(curve[-1]) for state, curve in curves.items()},
-        loads=loads[:-1],
-        curves={state: curve[:-1] for state, curve in curves.items()},
-        switching=switching,
-        places=places,
-        pitch=pitch,
-        touching=touching,
+        loads=loads,
+        curves=curves,
+        switching=parts('pressure bore hose', _switched, inputs, foot, parts),
+        pitch=math.nan if pitch is None else pitch,
+        remarks=tuple(parts.remarks),
     )
 
 
@@ -311,28 +282,28 @@ def _material(name: str) -> Material:
 
 def _pad(inputs: Inputs) -> Pad:
     """Return the pad; measured limits stay only with the pad on which they were measured."""
-    start, radius, thickness = inputs.foot.pad, inputs.radius, inputs.thickness
-    if inputs.material == MEASURED:
+    start, radius, thickness = inputs['foot'].pad, inputs['radius'], inputs['thickness']
+    if inputs['material'] == MEASURED:
         adhesion = Pad.adhesion_energy if start.material else start.adhesion_energy
-        pad = Pad(radius, inputs.stiffness, adhesion, thickness=thickness)
+        pad = Pad(radius, inputs['stiffness'], adhesion, thickness=thickness)
     else:
         own = start.material
-        same = own is not None and own.name == inputs.material
-        pad = Pad.of(own if same and own else _material(inputs.material), radius, thickness)  # type: ignore[arg-type]
+        same = own is not None and own.name == inputs['material']
+        pad = Pad.of(own if same and own else _material(inputs['material']), radius, thickness)
     measured = replace(pad, measured_limit=start.measured_limit)
     return measured if measured == start else pad
 
 
 def _criterion(inputs: Inputs, pad: Pad, parts: _Parts) -> str:
-    if inputs.criterion in criteria(pad):
-        return inputs.criterion
-    words = f'{inputs.criterion} is not known for these pads: {DEFAULT_CRITERION} is used'
+    if inputs['criterion'] in criteria(pad):
+        return inputs['criterion']
+    words = f'{inputs["criterion"]} is not known for these pads: {DEFAULT_CRITERION} is used'
     parts.note('criterion', words)
     return DEFAULT_CRITERION
 
 
 def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
-    end, ceiling = largest_pressure(pad, criterion), inputs.supply
+    end, ceiling = largest_pressure(pad, criterion), inputs['supply']
     if ceiling >= end:
         ceiling = float(math.floor(end))
         parts.note(
@@ -342,10 +313,10 @@ def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
         )
     _of(FOOT_SETTINGS, 'ceiling').accept(ceiling)  # or no file of this foot could be read
     return replace(
-        inputs.foot,
+        inputs['foot'],
         pad=pad,
-        pads=inputs.pads,
-        sole_radius=inputs.sole_radius,
+        pads=inputs['pads'],
+        sole_radius=inputs['sole_radius'],
         ceiling=ceiling,
         limit=criterion,
     )
@@ -353,29 +324,27 @@ def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
 
 def _below_ceiling(inputs: Inputs, foot: Foot) -> None:
     ceiling = 1e-3 * foot.ceiling
-    quantity('pressure', 1e-3 * inputs.pressure, 'kPa, the ceiling of the foot', high=ceiling)
+    quantity('pressure', 1e-3 * inputs['pressure'], 'kPa, the ceiling of the foot', high=ceiling)
 
 
-def _places(inputs: Inputs, free: Inflated | None, parts: _Parts) -> tuple[Array, float]:
-    """Return centres of the pads in a hexagonal pattern over the sole, and their pitch, m."""
-    radius, lattice = inputs.radius, hexagonal(inputs.pads)
-    reach = float(np.hypot(*lattice.T).max())
-    pitch = max(inputs.sole_radius - radius, 0.0) / max(reach, 0.5)
-    width = 0.0
-    if free is not None:
-        width = 2.0 * (free.sphere_radius if free.height > radius else radius)
-    if inputs.pads > 1 and pitch < max(width, 2.0 * radius):
+def _pitch(inputs: Inputs, free: Inflated | None, parts: _Parts) -> float:
+    """Return the pitch of the pads in a hexagonal pattern over the sole, m."""
+    radius = inputs['radius']
+    reach = float(np.hypot(*hexagonal(inputs['pads']).T).max())
+    pitch = max(inputs['sole_radius'] - radius, 0.0) / max(reach, 0.5)
+    width = 2.0 * radius
+    if free is not None and free.height > radius:
+        width = 2.0 * free.sphere_radius
+    if inputs['pads'] > 1 and pitch < width:
         what = 'pads overlap' if pitch < 2.0 * radius else 'free domes touch one another'
-        width = max(width, 2.0 * radius)
         parts.note(
             'pads',
             f'in a hexagonal pattern the {what}: they are {1e3 * width:.3g} mm wide at a pitch of'
             f' {1e3 * pitch:.3g} mm',
         )
-    return pitch * lattice, pitch
+    return pitch
 
 
-@functools.lru_cache(maxsize=64)
 def _limits(pad: Pad, pressure: float) -> dict[str, float]:
     """Return the force limit of a pad by criterion, N; NaN above a criterion's last pressure."""
     return {
@@ -386,29 +355,22 @@ def _limits(pad: Pad, pressure: float) -> dict[str, float]:
     }
 
 
-def _limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts) -> float:
-    """Return the limit of the foot, N."""
+def _within_limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts) -> None:
     value = foot.pads * limits[foot.limit]
-    if inputs.load > value:
+    if inputs['load'] > value:
         parts.note(
             'load',
             f'above the force limit of the foot by the criterion {foot.limit}, {value:.4g} N: the'
             ' domes are pressed flat, and the sole carries the rest',
         )
-    return value
-
-
-def _limit_curve(foot: Foot) -> tuple[Array, Array]:
-    pressures = np.linspace(0.0, foot.ceiling, _PRESSURES)
-    return pressures, np.array([foot.dome_load(math.inf, each) for each in pressures.tolist()])
 
 
 def _curves(
     inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts
 ) -> tuple[Array, dict[str, Array]]:
     """Return loads, the last of them the present one, and the capacity there by state, N."""
-    largest = max(1.3 * inputs.load, 1.2 * foot.pads * limits.get(foot.limit, 0.0))
-    loads = np.append(np.linspace(largest / _LOADS, largest, _LOADS), inputs.load)
+    largest = max(1.3 * inputs['load'], 1.2 * foot.pads * limits.get(foot.limit, 0.0))
+    loads = np.append(np.linspace(largest / _LOADS, largest, _LOADS), inputs['load'])
     found = {}
     for state in STATES:
         needs = 'load roughness' + ' film stand' * ('wet' in state)
@@ -422,29 +384,23 @@ def _curves(
 
 def _capacity(inputs: Inputs, foot: Foot, loads: Array, state: str) -> Array | None:
     """Return the capacity under loads, N."""
-    pressure = inputs.pressure if 'dome' in state else 0.0
+    pressure = inputs['pressure'] if 'dome' in state else 0.0
     if 'dome' in state and pressure < DOME_PRESSURE:
         return None  # the foot is flat
-    most, rough = foot.dome_load(math.inf, pressure), foot.on_rough(inputs.roughness)
+    most, rough = foot.dome_load(math.inf, pressure), foot.on_rough(inputs['roughness'])
     films, drained, found = (0.0, 0.0), Film(rough), []
     for load in loads.tolist():
         on_domes = min(load, most)
         if 'wet' in state:
-            drained.touch_down(inputs.film)
-            films = drained.drain(on_domes, load - on_domes, pressure, inputs.stand)
+            drained.touch_down(inputs['film'])
+            films = drained.drain(on_domes, load - on_domes, pressure, inputs['stand'])
         found.append(rough.resistance_of(on_domes, load - on_domes, pressure, *films))
     return np.array(found)
 
 
-def _touching(inputs: Inputs, foot: Foot) -> float:
-    """Return the share of a flat sole that touches."""
-    conforming = foot.on_rough(inputs.roughness).conforming_pressure
-    return min(inputs.load / (conforming * foot.sole_area), 1.0)
-
-
 def _ring(inputs: Inputs, pressed: Pressed, parts: _Parts) -> Meniscus:
-    ring = meniscus(pressed, LIQUIDS[inputs.liquid])
-    if ring.ring_radius > inputs.radius:
+    ring = meniscus(pressed, LIQUIDS[inputs['liquid']])
+    if ring.ring_radius > inputs['radius']:
         parts.note(
             'liquid',
             f'the ring of liquid has a radius of {1e3 * ring.ring_radius:.3g} mm, wider than the'
@@ -454,9 +410,9 @@ def _ring(inputs: Inputs, pressed: Pressed, parts: _Parts) -> Meniscus:
 
 
 def _switched(inputs: Inputs, foot: Foot, parts: _Parts) -> Switching | None:
-    if inputs.pressure <= DOME_PRESSURE:
+    if inputs['pressure'] <= DOME_PRESSURE:
         return None
-    found = _switching(foot, inputs.pressure, Hose(inputs.bore, inputs.hose))
+    found = _switching(foot, inputs['pressure'], Hose(inputs['bore'], inputs['hose']))
     if math.inf in found:
         parts.note('hose', f'the pads take longer than {_LONGEST:g} s to fill or to vent')
     return found
@@ -471,53 +427,36 @@ def _switching(foot: Foot, pressure: float, hose: Hose) -> Switching:
     return Switching(fill, time_to(channel, 0.0, DOME_PRESSURE, _TICK, _LONGEST))
 
 
-class Row(NamedTuple):
-    """A number on the page: key, label, and text with unit."""
-
-    key: str
-    label: str
-    text: str
-
-
-def rows(found: Explored) -> Iterator[tuple[str, list[Row]]]:
-    """Yield the numbers of the page by heading; a dash where there is none."""
-    free, pressed, ring, switching = found.free, found.pressed, found.ring, found.switching
-    if ring is not None and ring.ring_radius > found.inputs.radius:
+def rows(found: Explored) -> dict[str, dict[str, tuple[str, str]]]:
+    """Return the numbers of the page by heading and key: label, and text with unit, or a dash."""
+    ring, switching = found.ring, found.switching
+    if ring is not None and ring.ring_radius > found.inputs['radius']:
         ring = None  # a height that is not valid: see _ring
 
-    def length(of: Any, name: str, label: str, title: str) -> Row:
-        value = math.nan if of is None else float(getattr(of, name))
-        return Row(f'{label}-{name}', title, _text(value, 'mm', 1e-3))
+    def of(part: Any, name: str, unit: str = 'mm', size: float = 1e-3) -> str:
+        return _text(None if part is None else float(getattr(part, name)), unit, size)
 
-    yield (
-        'Dome',
-        [
-            length(free, 'height', 'free', 'free height'),
-            length(pressed, 'gap', 'pressed', 'gap under load'),
-            length(pressed, 'contact_radius', 'pressed', 'contact radius'),
-            length(ring, 'height', 'ring', 'ring of liquid, height'),
-        ],
-    )
-    yield (
-        'Force limit of a pad',
-        [Row(f'limit-{name}', name, _text(value, 'N')) for name, value in found.limits.items()],
-    )
-    yield (
-        'Foot',
-        [
-            Row('limit', 'force limit', _text(found.limit, 'N')),
-            Row('pitch', 'pitch of pads', _text(found.pitch, 'mm', 1e-3)),
-            Row('fill', 'fills to 90 % in', _text(switching and switching.fill, 's')),
-            Row('vent', 'flat again after', _text(switching and switching.vent, 's')),
-        ],
-    )
-    yield (
-        'Grip',
-        [
-            Row(f'grip-{state.replace(", ", "-")}', state, _text(found.grip.get(state), 'N'))
+    return {
+        'Dome': {
+            'free-height': ('free height', of(found.free, 'height')),
+            'pressed-gap': ('gap under load', of(found.pressed, 'gap')),
+            'pressed-contact_radius': ('contact radius', of(found.pressed, 'contact_radius')),
+            'ring-height': ('ring of liquid, height', of(ring, 'height')),
+        },
+        'Force limit of a pad': {
+            f'limit-{name}': (name, _text(value, 'N')) for name, value in found.limits.items()
+        },
+        'Foot': {
+            'limit': ('force limit', _text(found.limit, 'N')),
+            'pitch': ('pitch of pads', _text(found.pitch, 'mm', 1e-3)),
+            'fill': ('fills to 90 % in', of(switching, 'fill', 's', 1.0)),
+            'vent': ('flat again after', of(switching, 'vent', 's', 1.0)),
+        },
+        'Grip': {
+            f'grip-{state.replace(", ", "-")}': (state, _text(found.grip.get(state), 'N'))
             for state in STATES
-        ],
-    )
+        },
+    }
 
 
 def _text(value: float | None, unit: str, size: float = 1.0) -> str:

@@ -16,27 +16,19 @@ from ros_pad.reports.explore import STATES, Explored
 from ros_pad.reports.style import BLACK, BLUE, PALE, STANCE, VERMILION
 
 WIDTH, HEIGHT = 480.0, 310.0
-NAMES = ('profile', 'sole', 'grip', 'limits')
-COLOURS = {
-    'light': {'ink': BLACK, 'pale': PALE, 'sole': STANCE, 'dry': VERMILION, 'wet': BLUE},
-    'dark': {'ink': '#e6e6e6', 'pale': '#8a8f98', 'sole': '#3a3f47', 'dry': '#f0955a',
-             'wet': '#5fb4ec'},
-}  # fmt: skip
-STYLE = """
-.drawing text { font: 12px system-ui, "DejaVu Sans", Arial, sans-serif; fill: var(--ink); }
-.drawing .end { text-anchor: end; } .drawing .middle { text-anchor: middle; }
-.drawing path, .drawing circle, .drawing line { fill: none; stroke: var(--ink); }
-.drawing .axis { stroke: var(--pale); stroke-width: 1; }
-.drawing .grid { stroke: var(--pale); stroke-width: 0.5; opacity: 0.5; }
-.drawing .sole { fill: var(--sole); stroke: var(--pale); }
-.drawing .pad { stroke: var(--pale); stroke-width: 0.8; }
-.drawing .dry { stroke: var(--dry); stroke-width: 2; }
-.drawing .wet { stroke: var(--wet); stroke-width: 2; }
-.drawing .ink { stroke-width: 2; }
-.drawing .flat, .drawing .free { stroke-dasharray: 6 4; }
-.drawing .fill { fill: var(--dry); stroke: none; } .drawing .fill.wet { fill: var(--wet); }
-.drawing .fill.contact { opacity: 0.75; }
-.drawing .fill.point { fill: var(--ink); }
+NAMES = ('profile', 'grip')
+STYLE = f"""
+.drawing text {{ font: 12px system-ui, "DejaVu Sans", Arial, sans-serif; fill: {BLACK}; }}
+.drawing .end {{ text-anchor: end; }} .drawing .middle {{ text-anchor: middle; }}
+.drawing path, .drawing circle, .drawing line {{ fill: none; stroke: {BLACK}; }}
+.drawing .axis {{ stroke: {PALE}; stroke-width: 1; }}
+.drawing .grid {{ stroke: {PALE}; stroke-width: 0.5; opacity: 0.5; }}
+.drawing .sole {{ fill: {STANCE}; stroke: {PALE}; }}
+.drawing .dry {{ stroke: {VERMILION}; stroke-width: 2; }}
+.drawing .wet {{ stroke: {BLUE}; stroke-width: 2; }}
+.drawing .ink {{ stroke-width: 2; }}
+.drawing .flat, .drawing .free {{ stroke-dasharray: 6 4; }}
+.drawing .fill {{ fill: {VERMILION}; stroke: none; }} .drawing .fill.wet {{ fill: {BLUE}; }}
 """
 
 
@@ -106,8 +98,7 @@ class Plot:
 
 def drawings(found: Explored) -> dict[str, Drawing]:
     """Return the drawings of the page by name."""
-    made = profile(found), sole(found), grip(found), limits(found)
-    return dict(zip(NAMES, made, strict=True))
+    return {'profile': profile(found), 'grip': grip(found)}
 
 
 def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -> Array:
@@ -122,9 +113,9 @@ def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -
 
 def profile(found: Explored) -> Drawing:
     """Draw the dome free and pressed on the floor; cut through its axis."""
-    radius, free, pressed = found.inputs.radius, found.free, found.pressed
-    if found.pad is None:
-        return Drawing('One pad on the floor', 'There is no pad.', _nothing())
+    radius, free, pressed = found.inputs['radius'], found.free, found.pressed
+    if found.free is None and found.pressed is None:
+        return Drawing('One pad on the floor', 'There is no dome.', _nothing())
     tall = max(radius, *(each.height for each in (free, pressed) if each is not None), 0.0)
     scale = min((WIDTH - 40.0) / (3.2 * radius), (HEIGHT - 96.0) / tall)
     base, centre = 44.0, 0.5 * WIDTH
@@ -157,54 +148,19 @@ def profile(found: Explored) -> Drawing:
     return Drawing('One pad on the floor', f'Cut through one pad. {words}.', ''.join(body))
 
 
-def sole(found: Explored) -> Drawing:
-    """Draw the sole from below, flat and domed, with what touches the floor."""
-    if found.places is None:
-        return Drawing('Sole from below', 'There is no sole.', _nothing())
-    size = 0.22 * WIDTH
-    middle = 0.5 * HEIGHT - 14.0
-    scale = size / found.inputs.sole_radius
-    body = []
-    for centre, name in ((0.26 * WIDTH, 'flat'), (0.74 * WIDTH, 'dome')):
-        body.append(f'<circle class="sole" cx="{centre:.1f}" cy="{middle:.1f}" r="{size:.1f}"/>')
-        if name == 'flat' and found.touching:
-            # What touches lies scattered over the whole sole: its share is the opacity.
-            body.append(
-                f'<circle class="fill" style="opacity:{0.75 * found.touching:.3f}"'
-                f' cx="{centre:.1f}" cy="{middle:.1f}" r="{size:.1f}"/>'
-            )
-        contact = found.pressed.contact_radius if name == 'dome' and found.pressed else 0.0
-        for x, y in found.places.tolist():
-            place = f'cx="{centre + scale * x:.1f}" cy="{middle + scale * y:.1f}"'
-            body.append(f'<circle class="pad" {place} r="{scale * found.inputs.radius:.2f}"/>')
-            if contact:
-                body.append(f'<circle class="fill contact" {place} r="{scale * contact:.2f}"/>')
-    area = math.pi * found.inputs.sole_radius**2
-    share = math.nan
-    if found.pressed is not None:
-        share = found.inputs.pads * math.pi * found.pressed.contact_radius**2 / area
-    words = [
-        f'flat: {100.0 * found.touching:.3g} % touches' if found.touching else 'flat: –',
-        'domes: –' if math.isnan(share) else f'domes: {100.0 * share:.3g} % touches',
-    ]
-    for share, text in zip((0.26, 0.74), words, strict=True):
-        body.append(_text(share * WIDTH, HEIGHT - 10.0, text, 'middle'))
-    alt = f'{found.inputs.pads} pads on the sole. {". ".join(words)} of the area of the sole.'
-    return Drawing('Sole from below', alt, ''.join(body))
-
-
 def grip(found: Explored) -> Drawing:
     """Draw the tangential capacity over the load in four states."""
-    loads, title = found.loads.tolist(), 'Grip over load'
+    title, load = 'Grip over load', found.inputs['load']
     if not found.curves:
         return Drawing(title, 'No grip can be computed.', _nothing())
-    top = 1.05 * max(float(each.max()) for each in found.curves.values())
+    loads = found.loads[:-1].tolist()
+    top = 1.05 * max(float(each[:-1].max()) for each in found.curves.values())
     plot = Plot(max(loads), top, 'load on the foot, N', 'tangential capacity, N')
     for state, value in found.curves.items():
         morphology, ground = state.split(', ')
-        plot.line(loads, value.tolist(), f'{ground} {morphology}')
-        plot.point(found.inputs.load, found.grip[state], ground)
-    plot.line([found.inputs.load] * 2, [0.0, top], 'axis')
+        plot.line(loads, value[:-1].tolist(), f'{ground} {morphology}')
+        plot.point(load, float(value[-1]), ground)
+    plot.line([load, load], [0.0, top], 'axis')
     for place, state in enumerate(STATES):
         morphology, ground = state.split(', ')
         x = plot.left + 106.0 * place
@@ -214,34 +170,6 @@ def grip(found: Explored) -> Drawing:
         ]
     alt = '; '.join(f'{state} {value:.3g} N' for state, value in found.grip.items())
     return Drawing(title, f'Tangential capacity at the load: {alt}.', ''.join(plot.parts))
-
-
-def limits(found: Explored) -> Drawing:
-    """Draw the force limit of the foot over the pressure, with the load and other criteria."""
-    title, foot = 'Force limit over pressure', found.foot
-    if found.limit_curve is None or foot is None:
-        return Drawing(title, 'No force limit can be computed.', _nothing())
-    pressures, curve = found.limit_curve
-    there = {name: foot.pads * each for name, each in found.limits.items() if each == each}
-    load = found.inputs.load if 0.0 < found.inputs.load < math.inf else 0.0
-    top = 1.08 * max(float(curve.max()), load, *there.values())
-    plot = Plot(1e-3 * foot.ceiling, top, 'gauge pressure, kPa', 'force limit of the foot, N')
-    plot.line((1e-3 * pressures).tolist(), curve.tolist(), 'ink')
-    if load:
-        plot.line([0.0, plot.x_end], [load, load], 'dry')
-        plot.parts.append(_text(plot.left + 6.0, plot.y(load) - 5.0, 'load'))
-    now, lowest = 1e-3 * found.inputs.pressure, math.inf
-    if found.limit is not None:
-        plot.line([now, now], [min(there.values()), max(there.values())], 'wet')
-        side = -9.0 if now > 0.6 * plot.x_end else 9.0
-        for name, value in sorted(there.items(), key=lambda each: each[1]):
-            lowest = min(plot.y(value) + 4.0, lowest - 13.0)
-            plot.point(now, value, '' if name == foot.limit else 'wet')
-            kind = 'end' if side < 0.0 else ''
-            plot.parts.append(_text(plot.x(now) + side, lowest, name, kind))
-    plot.parts.append(_text(plot.left, 16.0, f'line: {foot.limit}; points: every criterion'))
-    listed = ', '.join(f'{name} {value:.3g} N' for name, value in there.items())
-    return Drawing(title, f'Force limit of the foot: {listed}.', ''.join(plot.parts))
 
 
 def _nothing() -> str:
@@ -255,8 +183,3 @@ def svg(drawing: Drawing) -> str:
         f'<svg class="drawing" role="img" aria-label="{alt}" viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
         f' xmlns="http://www.w3.org/2000/svg">{drawing.body}</svg>'
     )
-
-
-def variables(theme: str) -> str:
-    """Return the colours of a theme as CSS."""
-    return ' '.join(f'--{name}: {value};' for name, value in COLOURS[theme].items())

@@ -11,7 +11,6 @@ import asyncio
 import html
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 from ros_pad import configuration
@@ -29,8 +28,10 @@ from ros_pad.reports.explore import (
     Field,
     Inputs,
     explore,
+    inputs_of,
     rows,
 )
+from ros_pad.reports.style import BLUE, VERMILION
 
 HOST = '127.0.0.1'
 PATIENCE = 0.1
@@ -41,44 +42,29 @@ _GROUPS = {
     'Ground': ('load', 'liquid', 'film', 'stand', 'roughness'),
 }
 _CHOICES = {'material': 'Material', 'criterion': 'Criterion of the limit', 'liquid': 'Liquid'}
-_CSS = f"""
-:root {{ {explore_drawings.variables('light')} --paper: #fff; --line: #dcdfe4; }}
-.body--dark {{ {explore_drawings.variables('dark')} --paper: #16191e; --line: #343a43; }}
-{explore_drawings.STYLE}
-body {{ background: var(--paper); color: var(--ink); font: 15px/1.45 system-ui, sans-serif; }}
+_CSS = f"""{explore_drawings.STYLE}
+body {{ font: 15px/1.45 system-ui, sans-serif; }}
 .nicegui-content {{ padding: 0; display: block; }}
 .explore {{ display: grid; grid-template-columns: 21rem minmax(0, 1fr); gap: 0 1.5rem;
   max-width: 1500px; margin: 0 auto; padding: 1rem 1.25rem; }}
-.top {{ grid-column: 1 / -1; display: flex; flex-wrap: wrap; gap: 0.5rem 1rem;
-  align-items: center; }}
+.top {{ grid-column: 1 / -1; display: flex; gap: 1rem; align-items: center; }}
 .top > :first-child {{ margin-right: auto; }}
-.top h1 {{ font-size: 1.35rem; font-weight: 650; line-height: 1.2; margin: 0; }}
-.inputs {{ grid-row: 2 / 4; }}
+h1 {{ font-size: 1.35rem; font-weight: 650; line-height: 1.2; margin: 0; }}
 h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0.35rem; }}
+.inputs {{ grid-row: 2 / 4; }}
 .control {{ margin-bottom: 0.4rem; }}
-.control input[type=range] {{ width: 100%; accent-color: var(--wet); margin: 0; }}
+.control input[type=range] {{ width: 100%; margin: 0; }}
 .remark {{ font-size: 0.82rem; line-height: 1.3; margin: 0.1rem 0 0.4rem;
-  padding-left: 0.5rem; border-left: 3px solid var(--wet); overflow-wrap: anywhere; }}
-.remark.error {{ border-color: var(--dry); font-weight: 600; }}
-.figures {{ display: grid; gap: 0.5rem 1.5rem;
-  grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }}
-.figures svg {{ display: block; width: 100%; height: auto; }}
-.numbers {{ display: grid; gap: 0 1.25rem; margin-top: 0.5rem;
+  padding-left: 0.5rem; border-left: 3px solid {BLUE}; overflow-wrap: anywhere; }}
+.remark.error {{ border-color: {VERMILION}; font-weight: 600; }}
+.figures, .numbers {{ display: grid; gap: 0.5rem 1.5rem;
   grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); }}
+.figures {{ grid-template-columns: repeat(auto-fit, minmax(25rem, 1fr)); }}
 dl {{ margin: 0; font-size: 0.86rem; }}
-dl div {{ display: flex; justify-content: space-between; gap: 0.5rem; padding: 0.12rem 0;
-  border-bottom: 1px solid var(--line); white-space: nowrap; }}
+dl div {{ display: flex; justify-content: space-between; border-bottom: 1px solid #dcdfe4; }}
 dd {{ margin: 0; font-variant-numeric: tabular-nums; }}
-.note {{ font-size: 0.82rem; max-width: 62rem; margin-top: 0.8rem; }}
+.note {{ font-size: 0.82rem; margin-top: 0.8rem; }}
 .stale {{ opacity: 0.35; }}
-@media (max-width: 800px) {{
-  .explore {{ display: flex; flex-direction: column; padding: 0.75rem; }}
-  .figures {{ order: 1; display: flex; overflow-x: auto; scroll-snap-type: x mandatory;
-    position: sticky; top: 0; z-index: 5; background: var(--paper); gap: 0.75rem;
-    border-bottom: 1px solid var(--line); margin: 0 -0.75rem; padding: 0 0.75rem 0.4rem; }}
-  .figures > * {{ flex: 0 0 92%; scroll-snap-align: center; }}
-  .inputs {{ order: 2; }} .answer {{ order: 3; }}
-}}
 """
 
 
@@ -110,11 +96,10 @@ def serve(foot: Foot, port: int, browser: bool) -> None:
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
     core.sio.eio.cors_allowed_origins = None
     ui.run(
-        lambda: Page(Inputs.of(foot)).build(),
+        lambda: Page(inputs_of(foot)).build(),
         host=HOST,
         port=port,
         title=f'{foot.source} · pad explore',
-        dark=None,
         language='en-US',
         show=browser,
         reload=False,
@@ -194,7 +179,9 @@ class Page:
         fields = {field.name: field for field in FIELDS}
         with ui.element('div').classes('explore'):
             with ui.element('div').classes('top'):
-                ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>', sanitize=False)
+                ui.html(
+                    f'<h1>Foot {html.escape(self._inputs["foot"].source)}</h1>', sanitize=False
+                )
                 self._status = ui.label().props('role=status')
                 ui.button('Foot file', on_click=self._export).props('outline no-caps dense')
             with ui.element('section').classes('inputs').props('aria-label="Inputs"'):
@@ -219,9 +206,8 @@ class Page:
 
     def _number(self, field: Field) -> None:
         """Make a number and its slider, which move one another."""
-        value = getattr(self._inputs, field.name)
-        shown = None if value is None else float(f'{value / field.unit:.12g}')
-
+        value = self._inputs[field.name]
+        shown = None if value is None else field.read(value)
         sliding = False
 
         def slid(event: Any) -> None:
@@ -252,7 +238,7 @@ class Page:
         place(shown)
 
     def _choice(self, name: str) -> None:
-        value = getattr(self._inputs, name)
+        value = self._inputs[name]
         known = {
             'material': [MEASURED, *configuration.names('materials')],
             'criterion': list(CRITERIA),
@@ -266,7 +252,7 @@ class Page:
         ).props(f'dense outlined options-dense aria-label="{_CHOICES[name]}" name={name}')
 
     def _change(self, name: str, value: Any) -> None:
-        self._inputs = replace(self._inputs, **{name: value})
+        self._inputs = self._inputs | {name: value}
         self._latest.ask()
 
     def _set_pale(self, words: str) -> None:
@@ -277,7 +263,7 @@ class Page:
     def _show(self, answer: tuple[Explored, dict[str, str], str]) -> None:
         found, figures, numbers = answer
         # A material has its stiffness from its law.
-        self._controls['stiffness'].set_visibility(found.inputs.material == MEASURED)
+        self._controls['stiffness'].set_visibility(found.inputs['material'] == MEASURED)
         self._answers += 1
         for name, figure in figures.items():
             self._figures[name].set_content(figure)
@@ -331,13 +317,11 @@ def answer(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
         name: f'<h2>{each.title}</h2>{explore_drawings.svg(each)}'
         for name, each in explore_drawings.drawings(found).items()
     }
-    parts = []
-    for title, group in rows(found):
-        parts.append(f'<div><h2>{html.escape(title)}</h2><dl>')
-        parts += [
-            f'<div><dt>{html.escape(row.label)}</dt>'
-            f'<dd id="{row.key}">{html.escape(row.text)}</dd></div>'
-            for row in group
-        ]
-        parts.append('</dl></div>')
-    return found, figures, ''.join(parts)
+    numbers = ''
+    for title, group in rows(found).items():
+        lines = ''.join(
+            f'<div><dt>{html.escape(label)}</dt><dd id="{key}">{html.escape(text)}</dd></div>'
+            for key, (label, text) in group.items()
+        )
+        numbers += f'<div><h2>{title}</h2><dl>{lines}</dl></div>'
+    return found, figures, numbers

@@ -11,12 +11,9 @@ from collections.abc import Callable, Mapping
 import matplotlib
 from matplotlib.figure import Figure
 
-from ros_pad.configuration import refuse
-from ros_pad.errors import InvalidInput, PadError
-from ros_pad.pace import Progress
+from ros_pad.configuration import choice, refuse
+from ros_pad.errors import PadError
 from ros_pad.reports.style import DPI, PAPER_STYLE, Drawn, rendered
-
-_PICTURES = ('.png', '.svg', '.pdf')
 
 
 def save(path: str | os.PathLike[str], data: bytes, new_folder: bool = True) -> None:
@@ -58,20 +55,15 @@ def write_picture(
     PadError
         When the file cannot be written.
     """
-    ending = pathlib.Path(path).suffix
-    if ending not in _PICTURES:
-        raise InvalidInput(
-            f'figure = {os.fspath(path)!r} is not allowed: the name must end in .png, .svg or .pdf'
-        )
+    ending = choice(
+        f'ending of {os.fspath(path)}', pathlib.Path(path).suffix, ('.png', '.svg', '.pdf')
+    )
     with matplotlib.rc_context(PAPER_STYLE):
         save(path, rendered(draw(), ending[1:], dpi=dpi), new_folder=False)
 
 
 def write_figures(
-    drawn: Mapping[str, Drawn],
-    folder: str | os.PathLike[str],
-    force: bool = False,
-    progress: Progress | None = None,
+    drawn: Mapping[str, Drawn], folder: str | os.PathLike[str], force: bool = False
 ) -> list[pathlib.Path]:
     """Write figures for a paper, each as PDF and as PNG of 300 dpi, and return the files.
 
@@ -85,8 +77,6 @@ def write_figures(
         Created if it is missing.
     force : bool
         Replace existing files.
-    progress : callable or None
-        Called with the share that is done, 0 to 1.
 
     Raises
     ------
@@ -103,8 +93,6 @@ def write_figures(
     for path in files:
         refuse(path, force)
     with matplotlib.rc_context(PAPER_STYLE):
-        for done, (path, (figure, kind)) in enumerate(files.items(), 1):
+        for path, (figure, kind) in files.items():
             save(path, rendered(figure, kind, dpi=DPI))
-            if progress:
-                progress(done / len(files))
     return list(files)

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of a trial's report: policies compared, path, series over time, and statistics."""
+"""The figures of a trial's report: policies compared, and the series of each leg over time."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import matplotlib
@@ -15,8 +14,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.pace import Progress
-from ros_pad.reports import margins, path_map, reliability
 from ros_pad.reports.style import (
     BLACK,
     BLUE,
@@ -39,55 +36,73 @@ POLICY_NAMES = {
     'adaptive': 'adaptive',
     'oracle': 'oracle',
 }
-_BAR_NAMES = POLICY_NAMES | {'oracle': 'oracle\n(sees ahead)'}
+
+
+def draw(view: View) -> dict[str, Drawn]:
+    """Draw the figures for which a trial has the data; return them by name, in report order.
+
+    The caller must save them under ``matplotlib.rc_context(PAPER_STYLE)``, which sets the fonts.
+    """
+    found = {}
+    with matplotlib.rc_context(PAPER_STYLE):
+        if len(view.rows) > 1:
+            found['comparison'] = _comparison(view)
+        if len(view.trial.slow_time) > 1:
+            window = window_of(view)
+            found |= {'trial': _overview(view, window), 'window': _window(view, window)}
+    return found
 
 
 def draw_comparison(ax: Axes, view: View, size: float) -> None:
     """Draw the distance per gait cycle of each policy as bars; ``size`` is that of the text."""
     rows = view.rows
     values = [1e3 * row['distance_per_cycle_m'] for row in rows]
-    colours = [BLUE if row['policy'] == view.trial.policy else '#A9B4BC' for row in rows]
+    own = [row['policy'] == view.trial.policy for row in rows]
     places = np.arange(len(rows))[::-1]
-    ax.barh(places, values, color=colours, height=0.68)
-    ax.set_yticks(places, [_BAR_NAMES.get(row['policy'], row['policy']) for row in rows])
+    ax.barh(places, values, color=[BLUE if mine else '#A9B4BC' for mine in own], height=0.68)
+    names = POLICY_NAMES | {'oracle': 'oracle\n(sees ahead)'}
+    ax.set_yticks(places, [names.get(row['policy'], row['policy']) for row in rows])
     ax.tick_params(axis='y', length=0)
-    stride = 1e3 * view.settings.get('stride_m', 0.0)
+    stride = 1e3 * view.trial.settings.get('stride_m', 0.0)
     reach = max([*values, stride, 1.0])
-    for place, value, row in zip(places, values, rows, strict=True):
+    for place, value, mine in zip(places, values, own, strict=True):
         inside = value > 0.15 * reach
-        own = row['policy'] == view.trial.policy
         ax.text(
             max(value, 0.0),
             place,
             f'{value:.0f} ' if inside else f' {value:.0f}',
-            color='white' if own and inside else BLACK,
+            color='white' if mine and inside else BLACK,
             ha='right' if inside else 'left',
             va='center',
             fontsize=size,
-            fontweight='bold' if own else 'normal',
+            fontweight='bold' if mine else 'normal',
         )
     if stride:
         ax.axvline(stride, color=BLACK, linestyle='--', linewidth=1.0)
-        ax.text(
-            stride,
-            len(rows) - 0.5,
-            f'no slip: {stride:.0f} ',
-            ha='right',
-            va='bottom',
-            fontsize=0.9 * size,
-        )
+        words = f'no slip: {stride:.0f} '
+        ax.text(stride, len(rows) - 0.5, words, ha='right', va='bottom', fontsize=0.9 * size)
     ax.set_xlim(min(0.0, *values), 1.04 * reach)
     ax.set_ylim(-0.5, len(rows) - 0.05)
     ax.set_xlabel('advance per gait cycle / mm')
 
 
-def _comparison_figure(view: View) -> Figure:
+def _comparison(view: View) -> Drawn:
     figure = Figure(figsize=(COLUMN, 0.32 * len(view.rows) + 0.6), layout='constrained')
     draw_comparison(figure.subplots(), view, size=8.0)
-    return figure
+    bars = ', '.join(
+        f'{POLICY_NAMES.get(row["policy"], row["policy"])} '
+        f'{1e3 * row["distance_per_cycle_m"]:.0f} mm per cycle'
+        for row in view.rows
+    )
+    return Drawn(
+        figure,
+        'Advance by policy',
+        f'Bars: {bars}',
+        'The same robot on the same ground with the same noise, under each policy.',
+    )
 
 
-def _overview_figure(view: View, window: tuple[float, float]) -> Figure:
+def _overview(view: View, window: tuple[float, float]) -> Drawn:
     """Draw estimate, truth, morphology and alarms of each leg over the whole trial."""
     trial = view.trial
     figure = Figure(figsize=(WIDE, 0.55 * len(view.order) + 0.9), layout='constrained')
@@ -108,129 +123,18 @@ def _overview_figure(view: View, window: tuple[float, float]) -> Figure:
         ax.set_ylim(-0.35, 1.32)
         ax.set_yticks([0.0, 1.0])
         ax.set_ylabel(f'leg {trial.legs[column]}\nP(wet)')
-    if len(trial.slow_time):
-        axes[-1].set_xlim(math.floor(trial.slow_time[0]), trial.slow_time[-1])
+    axes[-1].set_xlim(math.floor(trial.slow_time[0]), trial.slow_time[-1])
     axes[-1].set_xlabel('time / s')
-    handles: list[Any] = [Line2D([], [], color=BLUE, label='P(wet), estimated')]
-    if view.wet is not None:
-        handles.append(Patch(facecolor=WET, label='wet ground, true'))
-    handles += [
+    handles = [
+        Line2D([], [], color=BLUE, label='P(wet), estimated'),
+        *([] if view.wet is None else [Patch(facecolor=WET, label='wet ground, true')]),
         Patch(facecolor=VERMILION, label='dome under pressure'),
         Line2D([], [], linestyle='', marker='|', color=BLACK, markersize=6, label='slip alarm'),
         Patch(facecolor='none', edgecolor=PALE, linestyle=':', label='enlarged below'),
     ]
     legend(figure, handles, columns=5)
-    return figure
-
-
-def _window_figure(view: View, window: tuple[float, float]) -> Figure:
-    """Draw pressure, P(wet) and slip of each leg in a part of the trial."""
-    trial = view.trial
-    rows = (trial.slow_time >= window[0]) & (trial.slow_time <= window[1])
-    time = trial.slow_time[rows]
-    figure = Figure(figsize=(WIDE, 0.72 * len(view.order) + 0.9), layout='constrained')
-    axes = figure.subplots(len(view.order), 3, sharex=True, sharey='col', squeeze=False)
-    titles = ('gauge pressure / kPa', 'P(wet)', 'slip speed / (mm/s)')
-    for ax, title in zip(axes[0], titles, strict=True):
-        ax.set_title(title)
-    for (pressure, wetness, slip), column in zip(axes, view.order, strict=True):
-        for ax in (pressure, wetness, slip):
-            _shade_stances(ax, view, trial.legs[column], window)
-        measured, wanted = trial.pressure[rows, column], trial.setpoint[rows, column]
-        pressure.plot(time, 1e-3 * measured, color=BLUE, linewidth=1.1)
-        pressure.step(time, 1e-3 * wanted, where='post', color=BLACK, linewidth=0.8, ls='--')
-        wetness.step(time, trial.wet_probability[rows, column], where='post', color=BLUE, lw=1.1)
-        wetness.set_ylim(-0.06, 1.06)
-        wetness.set_yticks([0.0, 0.5, 1.0])
-        speed = 1e3 * trial.slip_speed[rows, column]
-        slip.plot(time, speed, color=GREEN, linewidth=0.9)
-        alarm = trial.slipping[rows, column]
-        slip.plot(time[alarm], speed[alarm], '.', color=VERMILION, markersize=2.5)
-        pressure.set_ylabel(f'leg {trial.legs[column]}', fontweight='bold')
-    # Show at least this range, so that noise alone does not fill the axes.
-    for ax, least in ((axes[0, 0], 20.0), (axes[0, 2], 20.0)):
-        top = max(least, ax.get_ylim()[1])
-        ax.set_ylim(min(-0.04 * top, ax.get_ylim()[0]), top)
-    axes[0, 0].set_xlim(*window)
-    for ax in axes[-1]:
-        ax.set_xlabel('time / s')
-    handles: list[Any] = [Patch(facecolor=STANCE, label='stance')]
-    if view.wet is not None:
-        handles = [
-            Patch(facecolor=STANCE, label='stance on dry ground'),
-            Patch(facecolor=WET, label='on wet ground'),
-        ]
-    handles += [
-        Line2D([], [], color=BLUE, label='measured, estimated'),
-        Line2D([], [], color=BLACK, linestyle='--', label='set-point'),
-        Line2D([], [], color=GREEN, label='slip'),
-        Line2D([], [], linestyle='', marker='.', color=VERMILION, markersize=5, label='alarm'),
-    ]
-    legend(figure, handles, columns=6)
-    figure.align_ylabels(axes[:, 0])
-    return figure
-
-
-def _shade_stances(ax: Axes, view: View, leg: int, window: tuple[float, float]) -> None:
-    floor = view.trial.floor
-    for stance in view.stances:
-        if stance.leg == leg and stance.end > window[0] and stance.start < window[1]:
-            wet = floor is not None and floor.wet(*stance.touched)
-            ax.axvspan(
-                stance.start, stance.end, color=WET if wet else STANCE, linewidth=0.0, zorder=0
-            )
-
-
-def draw(view: View, progress: Progress | None = None) -> dict[str, Drawn]:
-    """Draw the figures for which a trial has the data; return them by name, in report order.
-
-    The caller must save them under ``matplotlib.rc_context(PAPER_STYLE)``, which sets the fonts.
-    """
-    trial = view.trial
-    window = window_of(view)
-    estimated, true = reliability.outcomes(view)
-    standing, used = margins.standing_margins(view), margins.limit_use(view)
-    found: dict[str, Drawn] = {}
-    makers: dict[str, tuple[bool, Callable[[], Drawn]]] = {
-        'comparison': (len(view.rows) > 1, lambda: _compared(view)),
-        'path': (
-            bool(view.stances) or bool(np.isfinite(trial.body).any()),
-            lambda: path_map.picture(view),
-        ),
-        'trial': (len(trial.slow_time) > 1, lambda: _overview(view, window)),
-        'window': (len(trial.slow_time) > 1, lambda: _large(view, window)),
-        'margins': (
-            any(each is not None and bool(np.isfinite(each).any()) for each in (standing, used)),
-            lambda: margins.picture(view, standing, used),
-        ),
-        'reliability': (len(estimated) > 0, lambda: reliability.picture(estimated, true)),
-    }
-    with matplotlib.rc_context(PAPER_STYLE):
-        for number, (name, (possible, make)) in enumerate(makers.items(), 1):
-            if possible:
-                found[name] = make()
-            if progress:
-                progress(number / len(makers))
-    return found
-
-
-def _compared(view: View) -> Drawn:
     return Drawn(
-        _comparison_figure(view),
-        'Advance by policy',
-        'Bars: '
-        + ', '.join(
-            f'{POLICY_NAMES.get(row["policy"], row["policy"])} '
-            f'{1e3 * row["distance_per_cycle_m"]:.0f} mm per cycle'
-            for row in view.rows
-        ),
-        'The same robot on the same ground with the same noise, under each policy.',
-    )
-
-
-def _overview(view: View, window: tuple[float, float]) -> Drawn:
-    return Drawn(
-        _overview_figure(view, window),
+        figure,
         'The whole trial, leg by leg',
         'For each leg over the whole trial: P(wet), true ground, times as a dome, and slip alarms',
         'Wet and dry ground give the same forces on a dome: P(wet) of a domed foot only fades to '
@@ -239,11 +143,66 @@ def _overview(view: View, window: tuple[float, float]) -> Drawn:
     )
 
 
-def _large(view: View, window: tuple[float, float]) -> Drawn:
+def _window(view: View, window: tuple[float, float]) -> Drawn:
+    """Draw force, pressure, P(wet) and slip of each leg in a part of the trial."""
+    trial = view.trial
+    fast = (trial.time >= window[0]) & (trial.time <= window[1])
+    slow = (trial.slow_time >= window[0]) & (trial.slow_time <= window[1])
+    time = trial.slow_time[slow]
+    figure = Figure(figsize=(WIDE, 0.72 * len(view.order) + 0.9), layout='constrained')
+    axes = figure.subplots(len(view.order), 4, sharex=True, sharey='col', squeeze=False)
+    titles = ('normal force / N', 'gauge pressure / kPa', 'P(wet)', 'slip speed / (mm/s)')
+    for ax, title in zip(axes[0], titles, strict=True):
+        ax.set_title(title)
+    for (force, pressure, wetness, slip), column in zip(axes, view.order, strict=True):
+        for ax in (force, pressure, wetness, slip):
+            _shade_stances(ax, view, column, slow)
+        force.plot(trial.time[fast], trial.force[fast, column, 2], color=BLUE, linewidth=0.9)
+        measured, wanted = trial.pressure[slow, column], trial.setpoint[slow, column]
+        pressure.plot(time, 1e-3 * measured, color=BLUE, linewidth=1.1)
+        pressure.step(time, 1e-3 * wanted, where='post', color=BLACK, linewidth=0.8, ls='--')
+        wetness.step(time, trial.wet_probability[slow, column], where='post', color=BLUE, lw=1.1)
+        speed = 1e3 * trial.slip_speed[slow, column]
+        slip.plot(time, speed, color=GREEN, linewidth=0.9)
+        alarm = trial.slipping[slow, column]
+        slip.plot(time[alarm], speed[alarm], '.', color=VERMILION, markersize=2.5)
+        force.set_ylabel(f'leg {trial.legs[column]}', fontweight='bold')
+    # Show at least this range, so that noise alone does not fill the axes.
+    for ax, least in zip(axes[0, (0, 1, 3)], (1.0, 20.0, 20.0), strict=True):
+        top = max(least, ax.get_ylim()[1])
+        ax.set_ylim(min(-0.04 * top, ax.get_ylim()[0]), top)
+    axes[0, 2].set_ylim(-0.06, 1.06)
+    axes[0, 0].set_xlim(*window)
+    for ax in axes[-1]:
+        ax.set_xlabel('time / s')
+    handles: list[Any] = [Patch(facecolor=STANCE, label='stance')]
+    if view.wet is not None:
+        handles.append(Patch(facecolor=WET, label='on wet ground'))
+    handles += [
+        Line2D([], [], color=BLUE, label='measured, estimated'),
+        Line2D([], [], color=BLACK, linestyle='--', label='set-point'),
+        Line2D([], [], color=GREEN, label='slip'),
+        Line2D([], [], linestyle='', marker='.', color=VERMILION, markersize=5, label='alarm'),
+    ]
+    legend(figure, handles, columns=6)
+    figure.align_ylabels(axes[:, 0])
     return Drawn(
-        _window_figure(view, window),
+        figure,
         f'From {window[0]:.0f} s to {window[1]:.0f} s',
-        'For each leg: pressure with set-point, probability of wet ground, and slip speed, with '
-        'stances shaded',
+        'For each leg: normal force, pressure with set-point, probability of wet ground, and slip '
+        'speed, with stances shaded',
         'The part of the trial in which most feet came onto wet ground or became domes.',
     )
+
+
+def _shade_stances(ax: Axes, view: View, column: int, rows: np.ndarray) -> None:
+    trial = view.trial
+    if not len(trial.time):
+        return
+    time = trial.slow_time[rows]
+    near = np.clip(np.searchsorted(trial.time, time + 1e-9) - 1, 0, None)
+    standing = trial.standing(view.load_gate)[near, column]
+    wet = np.zeros_like(standing) if view.wet is None else view.wet[rows, column]
+    for mask, colour in ((standing & ~wet, STANCE), (standing & wet, WET)):
+        for start, length in spans(time, mask):
+            ax.axvspan(start, start + length, color=colour, linewidth=0.0, zorder=0)

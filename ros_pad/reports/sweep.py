@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of a sweep: distance per cycle over the first parameter, one line for each policy."""
+"""The page of a sweep and its figure: distance per cycle over parameters, a line each policy."""
 
 from __future__ import annotations
 
+import html
 import itertools
 import os
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Sequence
 from typing import Any
+from urllib.parse import quote
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
-from ros_pad.reports.files import write_picture
+from ros_pad.reports.files import save
+from ros_pad.reports.page import heading, page, plain_table, section, table, warning
 from ros_pad.reports.style import (
     BLACK,
     BLUE,
@@ -26,7 +32,7 @@ from ros_pad.reports.style import (
     WIDE,
     Drawn,
 )
-from ros_pad.trials.sweep import Point, Sweep
+from ros_pad.trials.sweep import Found, Point, Row, points
 
 LOOKS = {
     'adaptive': (GREEN, 'o'),
@@ -34,30 +40,12 @@ LOOKS = {
     'dome': (BLUE, '^'),
     'oracle': (BLACK, 'D'),
 }
-PANELS = 48
+PANELS = 48  # largest number of panels of the figure
+MOST_ROWS = 1000  # largest number of rows of the table of conditions
+MOST_FAILURES = 50  # largest number of failed or ended trials in a table
 
 
-def draw(path: str | os.PathLike[str], points: Sequence[Point], sweep: Sweep) -> None:
-    """Write the figure of a sweep, see :func:`figure`.
-
-    Parameters
-    ----------
-    path : path
-        Ends in .png, .svg or .pdf. An existing file is replaced.
-    points : sequence of Point
-        Result of :func:`ros_pad.trials.sweep.points`.
-    sweep : Sweep
-        The sweep of these points.
-
-    Raises
-    ------
-    InvalidInput
-        When the path has another ending, or the figure would have more than 48 panels.
-    """
-    write_picture(path, lambda: figure(points, sweep).figure)
-
-
-def figure(points: Sequence[Point], sweep: Sweep) -> Drawn:
+def drawn(found: Found) -> Drawn:
     """Draw the means of a sweep with their 95 % intervals over seeds.
 
     The horizontal axis is the first parameter that has several values; without one, it is the
@@ -69,15 +57,19 @@ def figure(points: Sequence[Point], sweep: Sweep) -> Drawn:
     InvalidInput
         When the figure would have more than 48 panels.
     """
-    several = {name: list(each) for name, each in sweep.parameters.items() if len(each) > 1}
+    sweep, shown = found.sweep, points(found.rows, found.sweep.parameters)
     scenes = {'scene': list(sweep.scenes)}
-    # Without a parameter with several values, compare scenes.
+    several = {name: list(each) for name, each in sweep.parameters.items() if len(each) > 1}
     axis, *others = several or scenes
-    across = others[:1]
-    down = [*(['scene'] if axis != 'scene' and len(sweep.scenes) > 1 else []), *others[1:]]
     values = several | scenes
-    columns = _combinations(values, across)
-    rows = _combinations(values, down)
+    down = [*(['scene'] if axis != 'scene' and len(sweep.scenes) > 1 else []), *others[1:]]
+    columns, rows = (
+        [
+            dict(zip(names, each, strict=True))
+            for each in itertools.product(*(values[name] for name in names))
+        ]
+        for names in (others[:1], down)
+    )
     if len(rows) * len(columns) > PANELS:
         raise InvalidInput(
             f'the figure would have {len(rows) * len(columns)} panels: at most {PANELS} are'
@@ -85,112 +77,246 @@ def figure(points: Sequence[Point], sweep: Sweep) -> Drawn:
         )
     with matplotlib.rc_context(PAPER_STYLE):
         wide = len(columns) > 1 or len(values[axis]) > 6
-        found = Figure(figsize=(WIDE if wide else COLUMN, 0.9 + 1.7 * len(rows)))
-        found.set_layout_engine('constrained')
-        grid = found.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+        size = (WIDE if wide else COLUMN, 0.9 + 1.7 * len(rows))
+        figure = Figure(figsize=size, layout='constrained')
+        grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
         for axes_row, row in zip(grid, rows, strict=True):
             for axes, column in zip(axes_row, columns, strict=True):
                 wanted = row | column
-                own = [each for each in points if _belongs(each, wanted)]
+                # None: the policy does not depend on this parameter, and is in all panels.
+                own = [
+                    point
+                    for point in shown
+                    if all(point.labels[name] in (each, None) for name, each in wanted.items())
+                ]
                 _panel(axes, own, axis, values[axis])
-                axes.set_title('\n'.join(f'{name} = {_text(v)}' for name, v in wanted.items()))
+                axes.set_title('\n'.join(f'{name} = {_cell(v)}' for name, v in wanted.items()))
         for axes in grid[-1]:
             axes.set_xlabel(axis)
-        found.supylabel('advance per cycle / mm', fontsize=8)
-        _legend(found, points, 4 if wide else 2)
-    known = [each for each in points if each.mean is not None]
+        figure.supylabel('advance per cycle / mm', fontsize=8)
+        _legend(figure, shown, 4 if wide else 2)
+    ways = [1e3 * point.mean for point in shown if point.mean is not None]
+    reach = f'{min(ways):.0f} to {max(ways):.0f} mm' if ways else 'no valid walk'
     return Drawn(
-        found,
+        figure,
         f'Advance per gait cycle over {axis}',
-        f'Mean advance per gait cycle over {axis}, one line for each policy: '
-        + (
-            f'{1e3 * min(each.mean or 0.0 for each in known):.0f} to '
-            f'{1e3 * max(each.mean or 0.0 for each in known):.0f} mm'
-            if known
-            else 'no valid walk'
-        ),
-        'Means over seeds with their 95 % intervals (Student\'s t). Points are shifted sideways '
-        'so that none hides another. Open points: some walks failed or ended early and are left '
-        'out.',
-    )  # fmt: skip
+        f'Mean advance per gait cycle over {axis}, one line for each policy: {reach}',
+        "Means over seeds with their 95 % intervals (Student's t), shifted sideways so that none"
+        ' hides another. Open points: some walks failed or ended early and are left out.',
+    )
 
 
-def _combinations(values: Mapping[str, list[Any]], names: Sequence[str]) -> list[dict[str, Any]]:
-    chosen = itertools.product(*(values[name] for name in names))
-    return [dict(zip(names, each, strict=True)) for each in chosen]
-
-
-def _belongs(point: Point, wanted: Mapping[str, Any]) -> bool:
-    # None means that the policy does not depend on this parameter: the point is in all panels.
-    return all(point.labels[name] in (value, None) for name, value in wanted.items())
-
-
-def _panel(axes: Axes, points: Sequence[Point], axis: str, values: Sequence[Any]) -> None:
+def _panel(axes: Axes, shown: Sequence[Point], axis: str, values: Sequence[Any]) -> None:
     words = any(isinstance(value, str) for value in values)
     place = {value: index if words else value for index, value in enumerate(values)}
-    policies = list(dict.fromkeys(point.labels['policy'] for point in points))
-    ends = min(place.values()), max(place.values())
-    reach = (ends[1] - ends[0]) or 1.0
+    first, last = min(place.values()), max(place.values())
+    reach = (last - first) or 1.0
+    policies = list(dict.fromkeys(point.labels['policy'] for point in shown))
     for number, policy in enumerate(policies):
-        colour = LOOKS[policy][0]
+        colour, mark = LOOKS[policy]
         # Shift the policies sideways, so that no interval hides another.
         aside = (0.06 if words else 0.012) * reach * (number - 0.5 * (len(policies) - 1))
-        own = [
-            (each, each.mean)
-            for each in points
-            if each.labels['policy'] == policy and each.mean is not None
-        ]
-        # Draw a policy without this parameter as a level line, with its interval at the end.
-        level = [(point, mean) for point, mean in own if point.labels[axis] is None]
-        for point, mean in level:
-            axes.axhline(1e3 * mean, color=colour, lw=1.4)
-            _mark(axes, ends[1] + 0.08 * reach + aside, mean, point, policy)
-        own = [(point, mean) for point, mean in own if point.labels[axis] is not None]
-        own.sort(key=lambda pair: place[pair[0].labels[axis]])
-        x = [place[point.labels[axis]] + aside for point, _ in own]
-        axes.plot(x, [1e3 * mean for _, mean in own], color=colour, lw=0 if words else 1.4)
-        for at, (point, mean) in zip(x, own, strict=True):
-            _mark(axes, at, mean, point, policy)
-    if all(point.mean is None for point in points):
+        line = []
+        for point in shown:
+            if point.labels['policy'] != policy or point.mean is None:
+                continue
+            mean, value = 1e3 * point.mean, point.labels[axis]
+            if value is None:  # of a policy without this parameter: level, marked at the end
+                axes.axhline(mean, color=colour, lw=1.4)
+            else:
+                line.append((place[value] + aside, mean))
+            x = last + 0.08 * reach + aside if value is None else place[value] + aside
+            if point.low is not None and point.high is not None:
+                axes.plot([x, x], [1e3 * point.low, 1e3 * point.high], color=colour, lw=1.1)
+            inside = 'white' if point.left_out else colour
+            axes.plot(x, mean, mark, color=colour, mfc=inside, ms=4.5)
+        if line:
+            axes.plot(*zip(*sorted(line), strict=True), color=colour, lw=0 if words else 1.4)
+    if all(point.mean is None for point in shown):
         axes.text(0.5, 0.5, 'no valid walk', ha='center', transform=axes.transAxes)
-    axes.set_xlim(ends[0] - 0.06 * reach, ends[1] + 0.14 * reach)
-    if len(values) <= 5:
-        axes.set_xticks(list(place.values()))
     if words:
         axes.set_xlim(-0.5, len(values) - 0.5)
         axes.set_xticks(range(len(values)), [str(value) for value in values])
         axes.tick_params(axis='x', rotation=20 if len(values) > 1 else 0)
+    else:
+        axes.set_xlim(first - 0.06 * reach, last + 0.14 * reach)
+        if len(values) <= 5:
+            axes.set_xticks(list(place.values()))
     axes.grid(axis='y', color=PALE, alpha=0.3, lw=0.6)
     axes.set_axisbelow(True)
 
 
-def _mark(axes: Axes, x: float, mean: float, point: Point, policy: str) -> None:
-    colour, mark = LOOKS[policy]
-    if point.low is not None and point.high is not None:
-        axes.plot([x, x], [1e3 * point.low, 1e3 * point.high], color=colour, lw=1.1)
-    inside = 'white' if point.left_out else colour
-    axes.plot(x, 1e3 * mean, mark, color=colour, mfc=inside, ms=4.5)
-
-
-def _legend(figure: Figure, points: Sequence[Point], columns: int) -> None:
-    policies = dict.fromkeys(point.labels['policy'] for point in points)
+def _legend(figure: Figure, shown: Sequence[Point], columns: int) -> None:
     lines = [
         Line2D([], [], color=LOOKS[each][0], marker=LOOKS[each][1], ms=4.5, lw=1.4, label=each)
-        for each in policies
+        for each in dict.fromkeys(point.labels['policy'] for point in shown)
     ]
-    seeds = sorted({point.walks + point.left_out for point in points})
-    title = (
-        f'mean and 95 % interval over {seeds[0]}{f" to {seeds[-1]}" if seeds[1:] else ""} seeds'
-    )
-    if any(point.left_out for point in points):
-        lines.append(
-            Line2D([], [], color=PALE, marker='o', mfc='white', lw=0, label='some walks left out')
+    if any(point.left_out for point in shown):
+        look: dict[str, Any] = {'color': PALE, 'marker': 'o', 'mfc': 'white', 'lw': 0}
+        lines.append(Line2D([], [], label='some walks left out', **look))
+    seeds = sorted({point.walks + point.left_out for point in shown})
+    most = f' to {seeds[-1]}' if seeds[1:] else ''
+    title = f'mean and 95 % interval over {seeds[0]}{most} seeds'
+    look = {'title': title, 'title_fontsize': 8, 'alignment': 'left'}
+    figure.legend(handles=lines, loc='outside upper left', ncols=columns, **look)
+
+
+def write(found: Found, path: str | os.PathLike[str], force: bool = False) -> None:
+    """Write the page of a sweep: one HTML file that needs no other file, and no script.
+
+    Parameters
+    ----------
+    found : Found
+        Result of :func:`ros_pad.trials.sweep.read`.
+    path : path
+        HTML file to write.
+    force : bool
+        Whether to replace an existing file.
+
+    Raises
+    ------
+    InvalidInput
+        When the file exists and ``force`` is False.
+    PadError
+        When the file cannot be written.
+    """
+    refuse(path, force)
+    sweep, rows = found.sweep, found.rows
+    name = found.folder.resolve().name
+    facts = [
+        f'{len(rows)} trials of {len(sweep.scenes)} scene{"s" if sweep.scenes[1:] else ""}',
+        f'{len(sweep.policies)} policies' if sweep.policies[1:] else f'policy {sweep.policies[0]}',
+        f'seeds {_seeds(sweep.seeds)}',
+        f'ros_pad {found.about["version"]}',
+    ]
+    parts = [heading(f'Sweep {name}', facts)]
+    left_out = {
+        'trials failed': [(row['error'], row) for row in rows if row['error']],
+        'walks ended early': [
+            (row['verdict'], row) for row in rows if row['verdict'] and not row['error']
+        ],
+    }
+    for words, some in left_out.items():
+        if some:
+            parts.append(
+                warning(f'{len(some)} of {len(rows)} {words}, and are in no mean or median.')
+            )
+    for scene in sweep.scenes:
+        levels = sorted({row['level'] for row in rows if row['scene'] == scene})
+        if len(levels) > 1:
+            words = f'{scene} was walked on {" and ".join(levels)}'
+            parts.append(warning(f'{words}: a difference may come from that.'))
+    try:
+        with matplotlib.rc_context(PAPER_STYLE):
+            parts.append(section(drawn(found)))
+    except InvalidInput:
+        parts.append('<p>A figure would have too many panels: the table has all numbers.</p>')
+    parts.append('<h2>Condition by condition</h2>' + _conditions_table(found))
+    for words, some in left_out.items():
+        if some:
+            parts.append(f'<h2>Which {words}</h2>' + _failures(found, some))
+    parts.append('<h2>What was swept</h2>' + _swept(found))
+    save(path, page(f'Sweep {name}: ros_pad', parts).encode())
+
+
+def _conditions_table(found: Found) -> str:
+    sweep = found.sweep
+    # Parameters with only one value are below the table, not in it.
+    values = {'scene': sweep.scenes, **sweep.parameters}
+    names = [name for name, each in values.items() if len(each) > 1]
+    shown = points(found.rows, sweep.parameters)
+    body = []
+    for point in shown[:MOST_ROWS]:
+        own = [
+            row
+            for row in found.rows
+            if not row['error']
+            and not row['verdict']
+            and all(row[name] == value for name, value in point.labels.items())
+        ]
+        slips = [1e3 * np.mean(_of_legs(row, 'slip_path_m')) / row['cycles_walked'] for row in own]
+        switches = [sum(_of_legs(row, 'switches')) for row in own]
+        right = [1e2 * row['wet_accuracy'] for row in own if row.get('wet_accuracy') is not None]
+        ends = [f'{1e3 * end:.1f}' for end in (point.low, point.high) if end is not None]
+        body.append(
+            [
+                *(html.escape(_cell(point.labels[name])) for name in (*names, 'policy')),
+                *(str(point.walks), str(point.left_out)),
+                *('–' if point.mean is None else f'{1e3 * point.mean:.1f}', ' to '.join(ends)),
+                *(f'{np.median(each):.1f}' if each else '–' for each in (slips, switches, right)),
+            ]
         )
-    figure.legend(
-        handles=lines, loc='outside upper left', ncols=columns, title=title,
-        title_fontsize=8, alignment='left',
-    )  # fmt: skip
+    head = [
+        *(html.escape(name) for name in (*names, 'policy')),
+        *('walks', 'left out', 'mean / mm', '95 % interval'),
+        *('slip / mm', 'switches', 'wetness accuracy / %'),
+    ]
+    text = table(head, body, range(len(names) + 1, len(head)))
+    text += (
+        "<p class='note'>The mean is of the advance per gait cycle, its interval by Student's t."
+        ' The last three columns are medians over walks: slip is the slip path of a foot in a gait'
+        ' cycle, mean of the feet; switches are all morphology changes of a walk; wetness accuracy'
+        ' is the share of flat stances at whose end P(wet) was on the correct side of 0.5.</p>'
+    )
+    if len(shown) > MOST_ROWS:
+        text += f'<p>{len(shown) - MOST_ROWS} more conditions are in trials.csv.</p>'
+    return text
 
 
-def _text(value: object) -> str:
-    return f'{value:.4g}' if isinstance(value, float) else str(value)
+def _of_legs(row: Row, name: str) -> list[float]:
+    return [
+        each for key, each in row.items() if key.startswith(f'{name}_leg') and each is not None
+    ]
+
+
+def _failures(found: Found, rows: Sequence[tuple[str, Row]]) -> str:
+    """Return a table of trials: why, which, and the command that repeats it."""
+    body = []
+    for why, row in rows[:MOST_FAILURES]:
+        words = ['pad', 'sweep', row['scene'], '--policy', row['policy'], '--seed']
+        words.append(str(row['seed']))
+        for name in found.sweep.parameters:
+            if row[name] is not None:
+                words += ['--set', f'{name}={row[name]}']
+        again = html.escape(shlex.join([*words, '--fidelity', row['level']]))
+        body.append([html.escape(str(why)), f'<code>{again}</code>'])
+    # Reasons are long: unlike in other tables, let the first column wrap.
+    text = table(['why', 'command to repeat it'], body, range(0))
+    text = text.replace('<td>', '<td style="white-space: normal">')
+    if len(rows) > MOST_FAILURES:
+        text += f'<p>{len(rows) - MOST_FAILURES} more are in trials.csv.</p>'
+    return text
+
+
+def _swept(found: Found) -> str:
+    sweep, about = found.sweep, found.about
+    levels = sorted({str(row['level']) for row in found.rows})
+    text = plain_table(
+        [
+            ('scenes', ', '.join(sweep.scenes)),
+            ('policies', ', '.join(sweep.policies)),
+            ('seeds of floor and noise', _seeds(sweep.seeds)),
+            *((name, ', '.join(map(_cell, each))) for name, each in sweep.parameters.items()),
+            ('fidelity', f'{about["fidelity"]}: walked on {", ".join(levels)}'),
+            *((f'fingerprint of {name}', each[:16]) for name, each in found.fingerprints.items()),
+            ('all numbers', 'trials.csv beside this page, one row for each trial'),
+        ]
+    )
+    links = [
+        f'<a href="{quote(each.relative_to(found.folder).as_posix())}">'
+        f'{html.escape(each.parent.name)}</a>'
+        for each in sorted(found.folder.glob('*/report.html'))
+    ]
+    return text + (f'<p>Reports of trials: {", ".join(links)}</p>' if links else '')
+
+
+def _seeds(seeds: Sequence[int]) -> str:
+    if len(seeds) > 2 and list(range(seeds[0], seeds[-1] + 1)) == list(seeds):
+        return f'{seeds[0]} to {seeds[-1]}'
+    return ', '.join(map(str, seeds))
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f'{value:.6g}'
+    return '–' if value is None else str(value)

@@ -153,27 +153,28 @@ class Chains:
         Parameters
         ----------
         kinematics : Kinematics
-            Result of :meth:`solve`.
+            Result of :meth:`solve`, also for several positions.
         gravity : array (3,)
             Acceleration of gravity in the axes of the kinematics, m/s².
 
         Returns
         -------
-        array (legs, joints)
+        array (..., legs, joints)
             Torques, N m (forces, N, where joints slide).
         """
         frames = kinematics.frames
         axes = (frames[..., :3, :3] @ self._axes)[..., 0]
         centres = (frames @ self._centres)[..., :3, 0]
-        torques = np.empty((self.length, self.count))
+        torques = np.empty(axes.shape[:-1])
         for joint in range(self.length):
             # Weight of all links from this joint on, and its moment about the joint.
             masses = self._masses[joint:]
-            arms = ((centres[joint:] - frames[joint, :, :3, 3]) * masses[..., None]).sum(0)
+            arms = centres[..., joint:, :, :] - frames[..., joint, None, :, :3, 3]
+            arms = (arms * masses[..., None]).sum(-3)
             pull = np.where(
                 self._slides[joint, :, None],
                 masses.sum(0)[:, None] * gravity,
                 cross(arms, gravity),
             )
-            torques[joint] = -(axes[joint] * pull).sum(-1)
-        return torques.T
+            torques[..., joint, :] = -(axes[..., joint, :, :] * pull).sum(-1)
+        return torques.swapaxes(-1, -2)

@@ -21,21 +21,21 @@ from ros_pad.robots.chains import Chains, Joint, Kinematics
 from ros_pad.robots.gait import Gait
 from ros_pad.robots.rotation import Array, from_rpy, transform
 
+# Fewest and most legs of a robot.
 LEGS = (3, 8)
-"""Fewest and most legs of a robot."""
 
+# Depth by which a robot would sink if one leg carried all of it, m, where a file does not give
+# the stiffness of its legs.
 SAG = 7e-3
-"""Depth by which a robot would sink if one leg carried all of it, m, where a file does not give
-the stiffness of its legs."""
 
+# Longest leg, and largest distance of a place on a link from its joint, m.
 LONGEST = 5.0
-"""Longest leg, and largest distance of a place on a link from its joint, m."""
 
+# Shortest leg, m.
 SHORTEST = 5e-3
-"""Shortest leg, m."""
 
+# Largest mass of a robot, kg.
 HEAVIEST = 2000.0
-"""Largest mass of a robot, kg."""
 
 _METRES, _KILOGRAMS = 'm (not mm)', 'kg (not g)'  # of a file in other units, values are refused
 _DOWN = np.array((0.0, 0.0, -9.81))
@@ -528,7 +528,8 @@ def _from_table(table: Table, path: pathlib.Path) -> Robot:
             f' {sliding[0]} slides: take servo out; L2 does not simulate such a robot'
         )
     if 'gait' in table:
-        robot = replace(robot, gait=_gait(table, robot))
+        with table.table('gait') as part:
+            robot = replace(robot, gait=Gait.read(part, robot.hips))
     table.finish()
     return robot
 
@@ -555,7 +556,7 @@ def _of_links(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot
         )
     mass = table.number('mass', _KILOGRAMS, 1e-3, HEAVIEST)
     prefix = table.text('prefix', default='')
-    links = _links(table)
+    links, posture = _links(table)
     foot = _place(table, 'foot')
     legs, joints, feet = [], [], []
     with table.table('legs') as part:
@@ -572,7 +573,7 @@ def _of_links(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot
             f'{table.origin}: mass = {mass:g} kg is not allowed: at least {carried:g} kg is'
             ' needed, the mass of the links of the legs'
         )
-    home = np.array([[link.home for link in links]] * len(legs))
+    home = np.array([posture] * len(legs))
     trunk = _trunk(table, mass - carried, joints)
     return _assembled(path.stem, legs, joints, np.array(feet), trunk, home, mass=mass, **others)
 
@@ -599,17 +600,9 @@ def _place(table: Table, key: str, default: tuple[float, ...] | None = None) -> 
     return table.vector(key, _METRES, 3, -LONGEST, LONGEST, **given)
 
 
-@dataclass(frozen=True)
-class _Link:
-    """A joint and its link as a YAML file has them, for a leg on the left."""
-
-    joint: Joint
-    home: float
-
-
-def _links(table: Table) -> list[_Link]:
-    """Read the table ``joints``: joint by joint from the base to the foot."""
-    links = []
+def _links(table: Table) -> tuple[list[Joint], list[float]]:
+    """Read the table ``joints``, from the base to the foot, of a leg on the left; and its home."""
+    links, home = [], []
     with table.table('joints') as part:
         for name in part.keys:
             with part.table(name) as row:
@@ -628,10 +621,11 @@ def _links(table: Table) -> list[_Link]:
                     _place(row, 'centre', _ORIGIN),
                 )
                 unit, most = (_METRES, LONGEST) if joint.slides else ('rad', 10.0)
-                links.append(_Link(joint, row.number('home', unit, -most, most, default=0.0)))
+                links.append(joint)
+                home.append(row.number('home', unit, -most, most, default=0.0))
     if not links:
         raise ConfigError(f'{table.origin}: joints: at least one is needed')
-    return links
+    return links, home
 
 
 def _hip(table: Table, leg: str | int) -> tuple[Array, bool]:
@@ -649,27 +643,13 @@ def _mirrored(place: Array, mirrored: bool) -> Array:
     return place * _MIRROR if mirrored else place
 
 
-def _leg(prefix: str, links: Sequence[_Link], hip: Array, mirrored: bool) -> list[Joint]:
+def _leg(prefix: str, links: Sequence[Joint], hip: Array, mirrored: bool) -> list[Joint]:
     """Return the joints of a leg at a hip; only places are mirrored, never axes."""
     made = []
     at = hip
-    for link in links:
-        joint = link.joint
-        made.append(
-            Joint(
-                prefix + joint.name,
-                at @ transform(_mirrored(joint.at[:3, 3], mirrored), joint.at[:3, :3]),
-                joint.axis,
-                joint.slides,
-                joint.mass,
-                _mirrored(joint.centre, mirrored),
-            )
-        )
+    for joint in links:
+        place = transform(_mirrored(joint.at[:3, 3], mirrored), joint.at[:3, :3])
+        centre = _mirrored(joint.centre, mirrored)
+        made.append(replace(joint, name=prefix + joint.name, at=at @ place, centre=centre))
         at = np.eye(4)
     return made
-
-
-def _gait(table: Table, robot: Robot) -> Gait:
-    """Read the table ``gait``."""
-    with table.table('gait') as part:
-        return Gait.read(part, robot.hips)

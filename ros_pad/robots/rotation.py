@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+# Tensor e with (a x b)_i = e_ijk a_j b_k.
 LEVI_CIVITA: Array = np.zeros((3, 3, 3))
-"""Tensor e with (a x b)_i = e_ijk a_j b_k."""
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     LEVI_CIVITA[_i, _j, _k], LEVI_CIVITA[_i, _k, _j] = 1.0, -1.0
 

@@ -31,6 +31,12 @@ class _Joint(NamedTuple):
     mimics: str
 
 
+class _Link(NamedTuple):
+    mass: float
+    centre: Array
+    inertia: Array  # about the centre, in axes of the link, kg m²
+
+
 class Urdf:
     """The tree of links and joints in a URDF file.
 
@@ -65,9 +71,7 @@ class Urdf:
         if tree.tag != 'robot':
             raise self._error(f'expected <robot>, found <{tree.tag}>')
         self.name = tree.get('name', pathlib.Path(path).stem)
-        self._links = {
-            self._text(link, 'name'): self._inertial(link) for link in tree.iter('link')
-        }
+        self._links = {self._text(link, 'name'): self._link(link) for link in tree.iter('link')}
         self._joints: dict[str, _Joint] = {}  # by child
         # Transmissions and ros2_control have elements <joint> too, but deeper in the tree.
         for element in tree.findall('joint'):
@@ -79,10 +83,7 @@ class Urdf:
         if len(roots) != 1:
             raise self._error(f'one link without a parent is needed, found {roots}')
         self.root = roots[0]
-        self._inertias = {
-            self._text(link, 'name'): self._tensor(link) for link in tree.iter('link')
-        }
-        self.mass = sum(mass for mass, _ in self._links.values())
+        self.mass = sum(link.mass for link in self._links.values())
 
     def leg(self, foot: str) -> tuple[list[Joint], Array]:
         """Return the joints from the base to a link, and the transform of that link in the last.
@@ -141,9 +142,9 @@ class Urdf:
         centre = self._carried(self.root)[1]
         inertia = 0.0
         for link, at in self._fixed(self.root, np.eye(4)):
-            mass, middle = self._links[link]
+            mass, middle, tensor = self._links[link]
             away = (at @ np.append(middle, 1.0))[:2] - centre[:2]
-            turned = at[:3, :3] @ self._inertias[link] @ at[:3, :3].T
+            turned = at[:3, :3] @ tensor @ at[:3, :3].T
             inertia += float(turned[2, 2] + mass * (away @ away))
         return centre, inertia
 
@@ -161,13 +162,11 @@ class Urdf:
 
     def _carried(self, link: str) -> tuple[float, Array]:
         """Return mass and centre of a link and all that is fixed to it, in the link's frame."""
-        mass, moment = self._links[link][0], self._links[link][0] * self._links[link][1]
-        for joint in self._joints.values():
-            if joint.parent == link and joint.kind == 'fixed':
-                other, centre = self._carried(joint.child)
-                mass += other
-                moment = moment + other * (joint.at @ np.append(centre, 1.0))[:3]
-        return mass, moment / mass if mass > 0.0 else np.zeros(3)
+        mass, moment = 0.0, np.zeros(3)
+        for name, at in self._fixed(link, np.eye(4)):
+            mass += self._links[name].mass
+            moment += self._links[name].mass * (at @ np.append(self._links[name].centre, 1.0))[:3]
+        return mass, moment / mass if mass > 0.0 else moment
 
     def _fixed(self, link: str, at: Array) -> Iterator[tuple[str, Array]]:
         """Yield a link and all that is fixed to it, with their transforms to a frame."""
@@ -206,7 +205,7 @@ class Urdf:
         limit = element.find('limit')
         if limit is None:
             return -math.inf, math.inf
-        low, high = (float(self._numbers(limit, key, name, 1)[0]) for key in ('lower', 'upper'))
+        low, high = self._values(limit, name, 'lower', 'upper')
         if low > high:
             raise self._error(
                 f'joint {name!r}: lower = {low:g} is not allowed: at most upper = {high:g} is'
@@ -214,31 +213,25 @@ class Urdf:
             )
         return (low, high) if low < high else (-math.inf, math.inf)
 
-    def _tensor(self, link: xml.Element) -> Array:
-        """Return the inertia of a link about its centre of mass, kg m², in axes of the link."""
-        inertial, element = link.find('inertial'), link.find('inertial/inertia')
-        if inertial is None or element is None:
-            return np.zeros((3, 3))
-        name = link.get('name', '')
-        xx, yy, zz, xy, xz, yz = (
-            float(self._numbers(element, key, name, 1)[0])
-            for key in ('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz')
-        )
-        turn = self._placed(inertial, name)[:3, :3]
-        tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
-        return np.asarray(turn @ tensor @ turn.T)
-
-    def _inertial(self, link: xml.Element) -> tuple[float, Array]:
-        """Return mass, kg, and centre of mass, m, of a link."""
-        inertial = link.find('inertial')
+    def _link(self, link: xml.Element) -> _Link:
+        """Return mass, kg, centre of mass, m, and inertia, kg m², of a link."""
+        inertial, name = link.find('inertial'), link.get('name', '')
         if inertial is None:
-            return 0.0, np.zeros(3)
-        name = link.get('name', '')
-        element = inertial.find('mass')
-        mass = 0.0 if element is None else float(self._numbers(element, 'value', name, 1)[0])
+            return _Link(0.0, np.zeros(3), np.zeros((3, 3)))
+        at, mass, tensor = self._placed(inertial, name), 0.0, np.zeros((3, 3))
+        if (element := inertial.find('mass')) is not None:
+            (mass,) = self._values(element, name, 'value')
         if mass < 0.0:
             raise self._error(f'{name!r}: mass = {mass:g} is not allowed: at least 0 kg is needed')
-        return mass, self._placed(inertial, name)[:3, 3]
+        if (element := inertial.find('inertia')) is not None:
+            keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+            xx, xy, xz, yy, yz, zz = self._values(element, name, *keys)
+            tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+        return _Link(mass, at[:3, 3], at[:3, :3] @ tensor @ at[:3, :3].T)
+
+    def _values(self, element: xml.Element, name: str, *keys: str) -> list[float]:
+        """Return single numbers."""
+        return [float(self._numbers(element, key, name, 1)[0]) for key in keys]
 
     def _placed(self, element: xml.Element, name: str) -> Array:
         origin = element.find('origin')

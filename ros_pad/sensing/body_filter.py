@@ -24,28 +24,28 @@ from ros_pad.robots.rotation import Array, cross, rotation, skew
 Flags = npt.NDArray[np.bool_]
 
 GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
+# Squared Mahalanobis distance of a foot's innovation above which it slips: 99.9 % of χ² with 3
+# degrees of freedom.
 GATE = 16.27
-"""Squared Mahalanobis distance of a foot's innovation above which it slips: 99.9 % of χ² with 3
-degrees of freedom."""
 
+# Deviation of an acceleration between two samples over its jump from one to the other: impacts
+# are shorter than a sample.
 JUMP = 0.2
-"""Deviation of an acceleration between two samples over its jump from one to the other: impacts
-are shorter than a sample."""
 
+# Random motion of a foot that stands, m after 1 s, growing with the root of time.
 STRAY = 3e-4
-"""Random motion of a foot that stands, m after 1 s, growing with the root of time."""
 
+# Random sinking and rising of a foot that stands, m after 1 s, as its load changes.
 SINKING = 6e-3
-"""Random sinking and rising of a foot that stands, m after 1 s, as its load changes."""
 
+# Relative error of the speed of rolling: feet are no spheres, and sink in.
 ROLLING_ERROR = 0.15
-"""Relative error of the speed of rolling: feet are no spheres, and sink in."""
 
+# Time for which that error stays the same, s.
 ROLLING_TIME = 0.008
-"""Time for which that error stays the same, s."""
 
+# Speed, m/s, above which the filter has diverged.
 FASTEST = 100.0
-"""Speed, m/s, above which the filter has diverged."""
 
 _APART = 1e2  # m²: variance of a measurement that must not count
 _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
@@ -352,11 +352,11 @@ class BodyFilter:
         self.turn = rotation(turn) @ self.turn
 
 
+# Random walk of the bias of the gyro, rad/s after 1 s.
 GYRO_DRIFT = 2e-5
-"""Random walk of the bias of the gyro, rad/s after 1 s."""
 
+# Random walk of the bias of the accelerometer, m/s² after 1 s.
 FORCE_DRIFT = 1e-3
-"""Random walk of the bias of the accelerometer, m/s² after 1 s."""
 
 _UNIT = np.eye(3)
 _SIX = np.array((0, 0, 0, 1, 1, 1))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ros_pad.configuration import choice, instance, number
 from ros_pad.errors import InvalidInput
-from ros_pad.robots import Kinematics, Robot
+from ros_pad.robots import Chains, Kinematics, Robot
 from ros_pad.robots.rotation import Array, cross, quaternion, rotation, skew
 from ros_pad.sensing.body_filter import GATE, GRAVITY, BodyFilter, Flags
 from ros_pad.sensing.motion import (
@@ -27,83 +27,92 @@ from ros_pad.sensing.motion import (
     Rest,
     checked,
 )
-from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Shift, Unloaded
+from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
 from ros_pad.sensing.slip_window import SlipWindow
 
 WEIGHT = -float(GRAVITY[2])  # m/s²
 
+# Longest time between samples over which a foot keeps its foothold, s: then it may have stepped.
 LONGEST_STEP = 0.03
-"""Longest time between samples over which a foot keeps its foothold, s: then it may have
-stepped."""
 
+# Longest time between samples that the IMU is taken to bridge, s: then the velocity is unknown.
 LONGEST_GAP = 0.2
-"""Longest time between samples that the IMU is taken to bridge, s: then the velocity is
-unknown."""
 
+# Time for which feet may slip or be in the air before there is a doubt, s, and time for which a
+# gap leaves one.
 RECOVERY = 0.3
-"""Time for which feet may slip or be in the air before there is a doubt, s, and time for which a
-gap leaves one."""
 
+# Time for which all feet may slip before the velocity is taken to be wrong, s, if they slip
+# alike.
 LOST = 2.0
-"""Time for which all feet may slip before the velocity is taken to be wrong, s, if they slip
-alike."""
 
+# Largest difference of slip velocities that are alike, m/s.
 ALIKE = 0.03
-"""Largest difference of slip velocities that are alike, m/s."""
 
+# Time for which a slipping foot has to be slow before it counts as sticking, s.
 STICKS = 0.03
-"""Time for which a slipping foot has to be slow before it counts as sticking, s."""
 
+# The same for a foot that has just landed, s: it skids first.
 SETTLES = 0.012
-"""The same for a foot that has just landed, s: it skids first."""
 
+# Standard deviations of the slip speed up to which a foot is slow.
 SLOW = 2.5
-"""Standard deviations of the slip speed up to which a foot is slow."""
 
+# Standard deviations of the slip speed from which on a foot slips.
 FAST = 4.0
-"""Standard deviations of the slip speed from which on a foot slips."""
 
+# Time over which the gyro is averaged when the body is at rest, s.
 REST_TIME = 0.2
-"""Time over which the gyro is averaged when the body is at rest, s."""
 
+# Deviation of such a mean from the bias of the gyro, rad/s: nothing is quite at rest.
 BIAS_FLOOR = 3e-4
-"""Deviation of such a mean from the bias of the gyro, rad/s: nothing is quite at rest."""
 
+# Deviation of the rotation after a time without readings of the IMU, rad.
 BLIND_TURN = 0.1
-"""Deviation of the rotation after a time without readings of the IMU, rad."""
 
+# Deviations of angular velocity, rad/s, and acceleration, m/s², of a body between samples that
+# are far apart.
 BLIND_RATE, BLIND_ACCELERATION = 0.5, 4.0
-"""Deviations of angular velocity, rad/s, and acceleration, m/s², of a body between samples that
-are far apart."""
 
+# Slip speed up to which feet show a delay, m/s.
 CALM = 0.05
-"""Slip speed up to which feet show a delay, m/s."""
 
+# Random motion of feet that stand, m after 1 s, over the share of slips beyond SLIPPERY.
 CREEP = 0.03
-"""Random motion of feet that stand, m after 1 s, over the share of slips beyond SLIPPERY."""
 
+# Time between two looks at the length of the legs, s.
 LOOK = 0.25
-"""Time between two looks at the length of the legs, s."""
 
+# Relative error of the length of the legs above which that of the robot's file is wrong.
 WRONG_LENGTH = 0.06
-"""Relative error of the length of the legs above which that of the robot's file is wrong."""
 
+# Share of its variance that walking must have taken away before.
 LEARNT = 0.05
-"""Share of its variance that walking must have taken away before."""
 
+# Its deviation from then on.
 UNKNOWN_LENGTH = 0.05
-"""Its deviation from then on."""
 
+# Its deviation below which it is known again.
 KNOWN_LENGTH = 0.012
-"""Its deviation below which it is known again."""
 
+# Factor on the variance of a mean of slip velocities, as they vary in their window: neighbours
+# are not independent.
 UNSTEADY = 1.5
-"""Factor on the variance of a mean of slip velocities, as they vary in their window: neighbours
-are not independent."""
 
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
 FOOT_NOISE = 1e-4  # m: kinematics that are not quite right
-DAMPING = 1e-4  # m²: keeps forces finite where the leg is straight
+
+
+def forces_of(chains: Chains, kinematics: Kinematics, efforts: Array, gravity: Array) -> Array:
+    """Return the forces of the ground on the feet, (..., legs, 3), N, from joint torques, N m.
+
+    ``gravity``, (3,), m/s², is in the axes of the kinematics.
+    """
+    lines = kinematics.jacobians
+    holding = chains.gravity_torques(kinematics, gravity)
+    # 1e-4 m² keeps forces finite where the leg is straight.
+    square = lines @ lines.swapaxes(-1, -2) + 1e-4 * np.eye(3)
+    return np.asarray(np.linalg.solve(square, lines @ (holding - efforts)[..., None])[..., 0])
 
 
 class BodyEstimator:
@@ -141,9 +150,6 @@ class BodyEstimator:
         ``foot_radius``, 0 to 1: soft feet sink in.
     length_error : float
         Standard deviation of the relative error of the length of all legs, 0 to 0.5.
-    joint_delay : float
-        Time by which joints and forces are later than the IMU, s, -0.05 to 0.05: what came first
-        waits, so estimates are as late. :attr:`delay` shows it after some seconds of walking.
     rejection : bool
         Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
 
@@ -186,7 +192,6 @@ class BodyEstimator:
         force_axes: str = 'base',
         radius_error: float = 0.05,
         length_error: float = 0.003,
-        joint_delay: float = 0.0,
         rejection: bool = True,
     ) -> None:
         instance('robot', robot, Robot)
@@ -212,7 +217,6 @@ class BodyEstimator:
             length,
             max(1, round(length * rate)),
             choice('force_axes', force_axes, ('base', 'foot')) == 'foot',
-            number('joint_delay', joint_delay, 's', -0.05, 0.05),
             rejection,
         )
         errors = np.zeros((9, 9))
@@ -236,7 +240,6 @@ class BodyEstimator:
         self._window = SlipWindow(
             legs, options.window, options.samples, noise.encoder, noise.velocity
         )
-        self._shift = Shift(abs(options.late))
         self._time = math.nan
         self._step = 0.0  # the last one, s
         self._feet = Feet(legs, STICKS)
@@ -296,10 +299,6 @@ class BodyEstimator:
             )
         readings = (gyro, accelerometer, joint_positions, joint_velocities, foot_forces, efforts)
         given = checked(self._robot.home.shape, readings)
-        if self._options.late > 0.0:
-            given[:2] = self._shift.update(time, given[:2])
-        elif self._options.late < 0.0:
-            given[2:] = self._shift.update(time, given[2:])
         gyro, accelerometer, q, dq = given[:4]
         kinematics = self._robot.chains.solve(q, self._body.to_imu)
         forces = self._forces(time, kinematics, accelerometer, foot_forces is not None, given[4])
@@ -319,10 +318,7 @@ class BodyEstimator:
 
     @property
     def delay(self) -> tuple[float, float]:
-        """Delay of the joints behind the IMU, and its standard deviation, s.
-
-        It is apart from ``joint_delay``, and NaN before it is known.
-        """
+        """Delay of the joints behind the IMU, and its standard deviation, s; NaN until known."""
         return self._checks.delay.value, self._checks.delay.deviation
 
     @property
@@ -354,10 +350,7 @@ class BodyEstimator:
             return np.asarray(given @ self._robot.imu[:3, :3])
         # The specific force has weight and inertia of the legs in one, as far as they move with
         # the body.
-        lines = kinematics.jacobians
-        holding = self._robot.chains.gravity_torques(kinematics, -accelerometer)
-        square = lines @ lines.transpose(0, 2, 1) + DAMPING * np.eye(3)
-        return np.asarray(np.linalg.solve(square, lines @ (holding - given)[..., None])[..., 0])
+        return forces_of(self._robot.chains, kinematics, given, -accelerometer)
 
     def _begin(self, time: float, gyro: Array, accelerometer: Array, dq: Array) -> None:
         """Begin with the base at the origin, heading along x, tilted as the IMU shows."""

@@ -7,12 +7,10 @@ object with attributes, as rclpy and rosbags make them.
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as MappingType
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -24,21 +22,9 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from ros_pad.sensing.stage import SensingStage
 
-ARRIVAL = 'arrival'
-"""Source of stamps of messages that have none: the time at which they arrive."""
-
-RESET = 1.0
-"""Largest difference between arrival and the count of a counter that began before, s: if it is
-larger, the counter has begun anew."""
-
-_GRAVITY = 9.81  # m/s²
-_STEP = re.compile(r'([A-Za-z]\w*)(\[\d*\])?')
-_TYPE = re.compile(r'[a-z]\w*/msg/[A-Z]\w*')
-_AXES = {
-    f'{sign}{name}': factor * line
-    for name, line in zip('xyz', np.eye(3), strict=True)
-    for sign, factor in (('', 1.0), ('-', -1.0))
-}
+_AXES = dict(
+    zip(('x', 'y', 'z', '-x', '-y', '-z'), np.vstack([np.eye(3), -np.eye(3)]), strict=True)
+)
 _CORNERS = {
     'front_left': (1.0, 1.0),
     'front_right': (1.0, -1.0),
@@ -95,105 +81,8 @@ class Readings(NamedTuple):
             stage.joints(self.stamp, self.positions, self.velocities, self.efforts)
 
 
-@dataclass
-class _Clock:
-    """Where the stamps of a topic come from: a field, the arrival, or a counter."""
-
-    read: _Read | None
-    unit: float  # ns a count; 0 for a stamp with seconds and nanoseconds
-    delay: int = 0  # ns from the measurement to the stamp
-    offset: int | None = None
-
-    def stamp(self, message: Any, arrival: int) -> int:
-        return self._given(message, arrival) - self.delay
-
-    def _given(self, message: Any, arrival: int) -> int:
-        if self.read is None:
-            return arrival
-        value = self.read(message)
-        if not self.unit:
-            return int(value.sec) * 1_000_000_000 + int(value.nanosec)
-        count = round(float(value) * self.unit)
-        # The first arrival gives the offset; the delay of the others is not in their stamps.
-        if self.offset is None or abs(count + self.offset - arrival) > RESET * 1e9:
-            self.offset = arrival - count
-        return count + self.offset
-
-
-@dataclass(frozen=True)
-class _Vector:
-    """Three components of a sensor, turned into the axes of the IMU, the base or the foot."""
-
-    read: _Read
-    turn: Array  # axes and scale
-    absent: _Read | None  # a covariance whose first element is -1 where nothing is measured
-
-    def __call__(self, message: Any) -> Array | None:
-        if self.absent is not None and np.ravel(self.absent(message))[0] == -1.0:
-            return None
-        return self.turn @ _finite(self.read(message), 3)
-
-
-@dataclass(frozen=True)
-class _Joints:
-    """Positions, velocities and efforts of joints."""
-
-    names: _Read | None  # names in the message
-    order: tuple[str, ...]  # names where the message has none
-    fields: tuple[tuple[str, _Read], ...]  # positions, and velocities and efforts where given
-    wanted: tuple[str, ...]  # of the robot, as the message names them
-    factors: MappingType[str, Array]
-    offsets: Array
-    places: dict[tuple[str, ...], Array] = field(default_factory=dict)
-
-    def __call__(self, message: Any) -> dict[str, Array | None]:
-        names = self.order if self.names is None else tuple(map(str, self.names(message)))
-        if names not in self.places:
-            if len(self.places) > 16:
-                self.places.clear()
-            self.places[names] = _places(self.wanted, names)
-        place = self.places[names]
-        found: dict[str, Array | None] = {}
-        for kind, read in self.fields:
-            values = np.ravel(np.asarray(read(message), dtype=float))
-            if kind != 'positions' and (not values.size or np.isnan(values).all()):
-                found[kind] = None  # drivers leave out, or fill with NaN, what they do not measure
-                continue
-            if len(values) < len(names):
-                raise InvalidInput(
-                    f'{kind} of {len(values)} joints are not allowed: {len(names)} are needed'
-                )
-            chosen = _finite(values[place], len(place))
-            found[kind] = chosen * self.factors[kind]
-            if kind == 'positions':
-                found[kind] = chosen * self.factors[kind] + self.offsets
-        return found
-
-
-@dataclass(frozen=True)
-class _Forces:
-    """Forces of feet: vectors, one axis, or flags of contact."""
-
-    kind: str  # vector, normal or contact
-    read: _Read
-    legs: tuple[int, ...]
-    turn: Array  # axes and scale of a vector; of the others the direction, 3 x 1
-    offset: float = 0.0
-    made: tuple[float, ...] = ()
-
-    def __call__(self, message: Any) -> dict[int, Array]:
-        if self.kind == 'vector':
-            values = _finite(self.read(message), 3 * len(self.legs)).reshape(-1, 3)
-        else:
-            values = _finite(self.read(message), len(self.legs))[:, None] + self.offset
-            if self.kind == 'contact':
-                values = np.isin(values, self.made).astype(float)
-        return dict(zip(self.legs, values @ self.turn.T, strict=True))
-
-
-@dataclass(frozen=True)
-class Source:
-    """One topic of a mapping.
+class Source(NamedTuple):
+    """One topic of a mapping, and what reads its messages.
 
     Attributes
     ----------
@@ -201,20 +90,25 @@ class Source:
         Name of the topic.
     type_name : str
         Its message type, such as ``sensor_msgs/msg/Imu``.
+    stamp : callable
+        Time of the readings, ns, from the message and its arrival, ns.
+    gyro, accelerometer : callable or None
+        The reading of a message, array (3,), or None.
+    joints, forces : callable or None
+        Readings of a message by kind, and forces by index of the leg.
+    gives : frozenset of str
+        Kinds of these: ``stamps``, ``positions``, ``velocities``, ``efforts``, and of the forces
+        ``vector``, ``normal`` (one axis) or ``contact`` (flags).
     """
 
     topic: str
     type_name: str
-    clock: _Clock
-    gyro: _Vector | None
-    accelerometer: _Vector | None
-    joints: _Joints | None
-    forces: _Forces | None
-
-    @property
-    def package(self) -> str:
-        """The package of the message type."""
-        return self.type_name.partition('/')[0]
+    stamp: Callable[[Any, int], int]
+    gyro: _Read | None
+    accelerometer: _Read | None
+    joints: _Read | None
+    forces: _Read | None
+    gives: frozenset[str]
 
 
 class Mapping:
@@ -260,8 +154,9 @@ class Mapping:
         self.sources = tuple(sources)
         self.force_axes = axes
         self.missing = (*_missing(self.sources), *notes)
-        kinds = {source.forces.kind for source in sources if source.forces}
-        self.force_kind = min(kinds, key=('vector', 'normal', 'contact').index, default='')
+        gives = frozenset().union(*(source.gives for source in sources))
+        kinds = ('vector', 'normal', 'contact')
+        self.force_kind = next((kind for kind in kinds if kind in gives), '')
         self._sources = {source.topic.lstrip('/'): source for source in sources}
 
     @classmethod
@@ -296,7 +191,7 @@ class Mapping:
             for pattern in topics.keys:
                 with topics.table(pattern) as part:
                     sources += _sources(part, str(pattern), robot, made_for)
-        notes = _words(table, 'missing', ())
+        notes = table.sequence('missing', ())
         table.finish()
         if not sources:
             raise ConfigError(f'{path}: topics: at least one is needed')
@@ -333,7 +228,7 @@ class Mapping:
             )
         try:
             return Readings(
-                source.clock.stamp(message, arrival),
+                source.stamp(message, arrival),
                 source.gyro(message) if source.gyro else None,
                 source.accelerometer(message) if source.accelerometer else None,
                 **(source.joints(message) if source.joints else {}),
@@ -345,225 +240,278 @@ class Mapping:
 
 def _missing(sources: Sequence[Source]) -> list[str]:
     """Return what no topic gives, and what follows from that."""
+    gives = frozenset().union(*(source.gives for source in sources))
     found = []
     for name, words in (('gyro', 'raw angular velocity'), ('accelerometer', 'specific force')):
         if not any(getattr(source, name) for source in sources):
             found.append(f'{name}: no topic has {words}; the body estimator cannot run without it')
-    kinds = {kind for source in sources if source.joints for kind, _ in source.joints.fields}
-    if 'positions' not in kinds:
+    if 'positions' not in gives:
         found.append('joints: no topic has positions; the body estimator cannot run without them')
-    elif 'velocities' not in kinds:
+    elif 'velocities' not in gives:
         found.append('joint velocities: differences of positions replace them, with more noise')
-    forces = {source.forces.kind for source in sources if source.forces}
-    if not forces and 'efforts' not in kinds:
+    if not gives & {'vector', 'normal', 'contact', 'efforts'}:
         found.append(
             'force: neither foot forces nor efforts; contact and friction are unobservable'
         )
-    elif 'vector' not in forces and 'normal' in forces:
+    elif 'vector' not in gives and 'normal' in gives:
         found.append('friction: unobservable, the force has one axis')
-    elif 'vector' not in forces and 'contact' in forces:
+    elif 'vector' not in gives and 'contact' in gives:
         found.append('friction: unobservable, there are flags of contact and no forces')
-    if any(source.clock.read is None for source in sources):
-        late = ', '.join(source.topic for source in sources if source.clock.read is None)
-        found.append(f'stamps: {late} has none; delays of its messages are not corrected')
+    if late := [source.topic for source in sources if 'stamps' not in source.gives]:
+        text = f'{", ".join(late)} has none; delays of its messages are not corrected'
+        found.append(f'stamps: {text}')
     return found
 
 
 def _sources(part: Table, pattern: str, robot: Robot, made_for: str) -> list[Source]:
     """Read the table of one topic, or of one topic for each leg."""
     type_name = part.text('type')
-    if not _TYPE.fullmatch(type_name):
+    if not re.fullmatch(r'[a-z]\w*/msg/[A-Z]\w*', type_name):
         raise ConfigError(
             f'{part.origin}: type = {type_name!r} is not allowed: package/msg/Name is needed'
         )
     gyro, accelerometer = _vector(part, 'gyro'), _vector(part, 'accelerometer')
-    joints = _joints(part, robot, made_for) or _feet(part, robot, made_for)
-    forces = _forces(part, robot, single='{leg}' in pattern or '{name}' in pattern)
+    joints, kinds = _joints(part, robot, made_for)
+    single = '{leg}' in pattern or '{name}' in pattern
+    forces, kind = _forces(part, robot, single)
     path = part.text('stamp')
     unit = part.number('tick', 's', 1e-9, 1.0) * 1e9 if 'tick' in part else 0.0
-
     delay = round(part.number('delay', 's', -1.0, 1.0, default=0.0) * 1e9)
+    gives = frozenset({*kinds, kind, '' if path == 'arrival' else 'stamps'} - {''})
 
-    def made(topic: str, forces: _Forces | None) -> Source:
-        clock = _Clock(None if path == ARRIVAL else _reader(path, part.origin), unit, delay)
-        return Source(topic, type_name, clock, gyro, accelerometer, joints, forces)
+    def made(topic: str, forces: _Read | None) -> Source:
+        read = None if path == 'arrival' else _reader(path, part.origin)
+        return Source(
+            topic, type_name, _clock(read, unit, delay), gyro, accelerometer, joints, forces, gives
+        )
 
-    if '{leg}' not in pattern and '{name}' not in pattern:
+    if not single:
         return [made(pattern, forces)]
     if forces is None:
         raise ConfigError(f'{part.origin}: a topic of each leg needs a table force')
+
+    def of_leg(leg: int, read: _Read) -> _Read:
+        return lambda message: {leg: read(message)[0]}
+
     return [
         made(
             pattern.replace('{leg}', str(leg + 1)).replace('{name}', str(name)),
-            _Forces(**(vars(forces) | {'legs': (leg,)})),
+            of_leg(leg, forces),
         )
         for leg, name in enumerate(robot.legs)
     ]
 
 
-def _vector(part: Table, key: str) -> _Vector | None:
+def _clock(read: _Read | None, unit: float, delay: int) -> Callable[[Any, int], int]:
+    """Return what gives the stamps of a topic: a field, the arrival, or a counter.
+
+    ``unit`` is ns a count, 0 for a stamp with seconds and nanoseconds; ``delay`` is the time from
+    the measurement to the stamp, ns.
+    """
+    offset: int | None = None
+
+    def stamp(message: Any, arrival: int) -> int:
+        nonlocal offset
+        if read is None:
+            return arrival - delay
+        value = read(message)
+        if not unit:
+            return int(value.sec) * 1_000_000_000 + int(value.nanosec) - delay
+        count = round(float(value) * unit)
+        # The first arrival gives the offset; the delay of the others is not in their stamps. A
+        # counter that is 1 s off has begun anew.
+        if offset is None or abs(count + offset - arrival) > 1_000_000_000:
+            offset = arrival - count
+        return count + offset - delay
+
+    return stamp
+
+
+def _vector(part: Table, key: str) -> _Read | None:
+    """Read three components of a sensor, turned into the axes of the IMU."""
     if key not in part:
         return None
     with part.table(key) as row:
-        absent = row.text('absent', default='')
-        return _Vector(
-            _reader(row.text('field'), row.origin),
-            _turn(row),
-            _reader(absent, row.origin) if absent else None,
-        )
+        field, turn = _reader(row.text('field'), row.origin), _turn(row)
+        # A covariance whose first element is -1 where nothing is measured.
+        absent = _reader(row.text('absent'), row.origin) if 'absent' in row else None
+
+    def read(message: Any) -> Array | None:
+        if absent is not None and np.ravel(absent(message))[0] == -1.0:
+            return None
+        return np.asarray(turn @ _finite(field(message), 3))
+
+    return read
 
 
 def _turn(row: Table) -> Array:
     """Read ``axes`` and ``scale``: the matrix that turns a reading into axes of the robot."""
-    axes = _words(row, 'axes', ('x', 'y', 'z'))
+    axes = row.sequence('axes', ('x', 'y', 'z'))
     if len(axes) != 3 or not set(axes) <= set(_AXES) or len({each[-1] for each in axes}) != 3:
         raise ConfigError(
             f'{row.origin}: axes = {axes} is not allowed: x, y and z in any order, each with or'
             ' without a minus, are needed'
         )
-    return np.array([_AXES[each] for each in axes]) * row.number(
-        'scale', '', -1e9, 1e9, default=1.0
-    )
+    return np.array([_AXES[each] for each in axes]) * _scale(row, 'scale')
 
 
-def _joints(part: Table, robot: Robot, made_for: str) -> _Joints | None:
-    if 'joints' not in part:
-        return None
-    with part.table('joints') as row:
-        names = row.text('names', default='')
-        order = _words(row, 'order', ())
-        if bool(names) == bool(order):
-            raise ConfigError(f'{row.origin}: either names or order is needed')
-        fields = [
-            (kind, _reader(row.text(kind), row.origin))
-            for kind in ('positions', 'velocities', 'efforts')
+def _scale(row: Table, key: str) -> float:
+    return row.number(key, '', -1e9, 1e9, default=1.0)
+
+
+def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tuple[str, ...]]:
+    """Read what gives readings of joints, or feet in the body for legs that slide along its axes.
+
+    Return it, and its kinds: ``positions``, and ``velocities`` and ``efforts`` where given.
+    """
+    if 'joints' not in part and 'feet' not in part:
+        return None, ()
+    known = list(robot.joint_names)
+    signs, offsets = np.ones(len(known)), np.zeros(len(known))
+    with part.table('joints' if 'joints' in part else 'feet') as row:
+        names, wanted = None, known
+        if 'joints' not in part:
+            offsets, order = _feet(row, robot, made_for)
+        else:
+            if ('names' in row) == ('order' in row):
+                raise ConfigError(f'{row.origin}: either names or order is needed')
+            if 'names' in row:
+                names, order = _reader(row.text('names'), row.origin), ()
+            else:
+                order = row.sequence('order')
+            with row.table('rename', default={}) as words:
+                renamed = {_place(words, name, known): words.text(name) for name in words.keys}
+            wanted = [renamed.get(place, name) for place, name in enumerate(known)]
+            for name in row.sequence('reversed', ()):
+                signs[_place(row, name, known)] = -1.0
+            with row.table('offsets', default={}) as values:
+                for name in values.keys:
+                    offsets[_place(values, name, known)] = values.number(
+                        name, 'rad', -100.0, 100.0
+                    )
+        scale = row.number('scale', '', 1e-9, 1e9, default=1.0)
+        scales = {'positions': scale, 'velocities': scale, 'efforts': _scale(row, 'effort_scale')}
+        fields = {
+            kind: _reader(row.text(kind), row.origin)
+            for kind in scales
             if kind == 'positions' or kind in row
-        ]
-        known = robot.joint_names
-        with row.table('rename', default={}) as words:
-            renamed = {_one_of(words, name, known): words.text(name) for name in words.keys}
-        wanted = tuple(renamed.get(name, name) for name in known)
+        }
         if order:
             try:
                 _places(wanted, order)
             except InvalidInput as error:
                 hint = f'; this mapping is made for the robot {made_for}' if made_for else ''
                 raise ConfigError(f'{row.origin}: order: {error}{hint}') from None
-        signs = np.ones(len(known))
-        for name in _words(row, 'reversed', ()):
-            signs[known.index(_one_of(row, name, known))] = -1.0
-        offsets = np.zeros(len(known))
-        with row.table('offsets', default={}) as values:
-            for name in values.keys:
-                place = known.index(_one_of(values, name, known))
-                offsets[place] = values.number(name, 'rad', -100.0, 100.0)
-        scale = row.number('scale', '', 1e-9, 1e9, default=1.0)
-        effort_scale = row.number('effort_scale', '', -1e9, 1e9, default=1.0)
-        factors = {'positions': signs * scale, 'velocities': signs * scale}
-        factors['efforts'] = signs * effort_scale
-        reader = _reader(names, row.origin) if names else None
-        return _Joints(reader, order, tuple(fields), wanted, factors, offsets)
+    last: dict[tuple[str, ...], Array] = {}  # places by the last names
+
+    def read(message: Any) -> dict[str, Array | None]:
+        given = tuple(map(str, names(message))) if names else tuple(order)
+        if given not in last:
+            places = _places(wanted, given)
+            last.clear()
+            last[given] = places
+        found: dict[str, Array | None] = {}
+        for kind, field in fields.items():
+            values = np.ravel(np.asarray(field(message), dtype=float))
+            if kind != 'positions' and (not values.size or np.isnan(values).all()):
+                found[kind] = None  # drivers leave out, or fill with NaN, what they do not measure
+                continue
+            if len(values) < len(given):
+                raise InvalidInput(
+                    f'{kind} of {len(values)} joints are not allowed: {len(given)} are needed'
+                )
+            read_out = _finite(values[last[given]], len(known)) * (signs * scales[kind])
+            found[kind] = read_out + offsets if kind == 'positions' else read_out
+        return found
+
+    return read, tuple(fields)
 
 
-def _feet(part: Table, robot: Robot, made_for: str) -> _Joints | None:
-    """Read the table ``feet``: places of feet in the body, for legs that slide along its axes."""
-    if 'feet' not in part:
-        return None
+def _feet(row: Table, robot: Robot, made_for: str) -> tuple[Array, tuple[str, ...]]:
+    """Read the legs of places of feet; return what zeroes them, and the order of the joints."""
     zero = np.zeros(robot.home.size)
     lines = robot.foot_jacobians(zero)
     if lines.shape != (len(robot.legs), 3, 3) or np.abs(lines - np.eye(3)).max() > 1e-9:
         raise ConfigError(
-            f'{part.origin}: feet: places of feet need a robot whose legs slide along x, y and z,'
+            f'{row.origin}: places of feet need a robot whose legs slide along x, y and z,'
             f' such as {made_for or "go2_feet"}; legs of {robot.name} do not'
         )
-    with part.table('feet') as row:
-        legs = [_leg(row, each, robot) for each in row.sequence('legs')]
-        if sorted(legs) != list(range(len(robot.legs))):
-            raise ConfigError(f'{row.origin}: legs: each of {robot.legs} is needed once')
-        names = robot.joint_names
-        order = tuple(names[3 * leg + axis] for leg in legs for axis in range(3))
-        fields = [
-            (kind, _reader(row.text(kind), row.origin))
-            for kind in ('positions', 'velocities')
-            if kind == 'positions' or kind in row
-        ]
-        factors = {
-            kind: np.full(len(names), row.number('scale', '', 1e-9, 1e9, default=1.0))
-            for kind, _ in fields
-        }
-        places = -robot.foot_positions(zero).ravel()
-        return _Joints(None, order, tuple(fields), names, factors, places)
+    legs = _legs(row, robot)
+    if sorted(legs) != list(range(len(robot.legs))):
+        raise ConfigError(f'{row.origin}: legs: each of {robot.legs} is needed once')
+    order = tuple(robot.joint_names[3 * leg + axis] for leg in legs for axis in range(3))
+    return -robot.foot_positions(zero).ravel(), order
 
 
-def _forces(part: Table, robot: Robot, single: bool) -> _Forces | None:
-    kinds = [key for key in ('force', 'normal_force', 'contact') if key in part]
-    if not kinds:
-        return None
-    if len(kinds) > 1:
-        raise ConfigError(f'{part.origin}: only one of {", ".join(kinds)} is allowed')
-    with part.table(kinds[0]) as row:
-        read = _reader(row.text('field'), row.origin)
-        legs = (0,) if single else tuple(_leg(row, each, robot) for each in row.sequence('legs'))
-        if len(set(legs)) != len(legs):
-            raise ConfigError(f'{row.origin}: legs: each leg is allowed once')
-        if kinds[0] == 'force':
-            return _Forces('vector', read, legs, _turn(row))
-        up = np.array(((0.0,), (0.0,), (1.0,)))
-        if kinds[0] == 'normal_force':
-            up *= row.number('scale', '', -1e9, 1e9, default=1.0)
-            return _Forces('normal', read, legs, up, row.number('offset', '', default=0.0))
-        made = tuple(map(float, row.sequence('made', (1,))))
+def _forces(part: Table, robot: Robot, single: bool) -> tuple[_Read | None, str]:
+    """Read what gives the forces of feet, by leg, and their kind: vector, normal or contact.
+
+    With ``single``, a message has the force of one leg, which is named 0.
+    """
+    keys = [key for key in ('force', 'normal_force', 'contact') if key in part]
+    if not keys:
+        return None, ''
+    if len(keys) > 1:
+        raise ConfigError(f'{part.origin}: only one of {", ".join(keys)} is allowed')
+    kind = {'force': 'vector', 'normal_force': 'normal', 'contact': 'contact'}[keys[0]]
+    with part.table(keys[0]) as row:
+        field = _reader(row.text('field'), row.origin)
+        legs = (0,) if single else _legs(row, robot)
         # A foot that stands has the load that the estimator expects.
-        load = robot.mass * _GRAVITY / (0.5 * len(robot.legs))
-        return _Forces('contact', read, legs, up * load, made=made)
+        load = robot.mass * 9.81 / (0.5 * len(robot.legs))
+        offset, made = 0.0, ()
+        if kind == 'vector':
+            turn = _turn(row)
+        elif kind == 'normal':
+            turn = _AXES['z'][:, None] * _scale(row, 'scale')
+            offset = row.number('offset', '', default=0.0)
+        else:
+            turn, made = _AXES['z'][:, None] * load, row.sequence('made', (1,))
+
+    def read(message: Any) -> dict[int, Array]:
+        if kind == 'vector':
+            values = _finite(field(message), 3 * len(legs)).reshape(-1, 3)
+        else:
+            values = _finite(field(message), len(legs))[:, None] + offset
+            if kind == 'contact':
+                values = np.isin(values, made).astype(float)
+        return dict(zip(legs, values @ turn.T, strict=True))
+
+    return read, kind
 
 
-def _leg(row: Table, name: Any, robot: Robot) -> int:
-    """Return the index of a leg: its name, or the corner of the robot at which its hip is."""
-    if name in robot.legs:
-        return robot.legs.index(name)
-    if name in _CORNERS:
-        x, y = _CORNERS[name]
-        found = [i for i, hip in enumerate(robot.hips) if hip[0] * x > 0.0 and hip[1] * y > 0.0]
-        if len(found) == 1:
-            return found[0]
-        raise ConfigError(f'{row.origin}: {len(found)} legs of robot {robot.name} are {name}')
-    raise ConfigError(
-        f'{row.origin}: legs: {shown(name)} is not allowed: one of'
-        f' {", ".join(map(str, robot.legs))}, or of {", ".join(_CORNERS)}, is needed'
-    )
+def _legs(row: Table, robot: Robot) -> tuple[int, ...]:
+    """Read indices of legs: by name, or by the corner of the robot at which the hip is."""
+    found = []
+    for name in row.sequence('legs'):
+        x, y = _CORNERS.get(name, (0.0, 0.0))
+        corner = [i for i, hip in enumerate(robot.hips) if hip[0] * x > 0.0 and hip[1] * y > 0.0]
+        leg = [robot.legs.index(name)] if name in robot.legs else corner
+        if len(leg) != 1 or leg[0] in found:
+            raise ConfigError(
+                f'{row.origin}: legs: {shown(name)} is not allowed: different ones of'
+                f' {", ".join(map(str, robot.legs))}, or of {", ".join(_CORNERS)}, are needed'
+            )
+        found += leg
+    return tuple(found)
 
 
 def _places(wanted: Sequence[str], names: Sequence[str]) -> Array:
     """Return where each wanted joint is among names; raise `InvalidInput` for one that is not."""
     for joint in wanted:
         if joint not in names:
-            others = [name for name in names if name not in wanted]
-            near = difflib.get_close_matches(joint, others, n=1)
-            hint = f'; is {near[0]!r} this joint?' if near else ''
             raise InvalidInput(
-                f'joint {joint!r} is not among {", ".join(map(str, names)) or "no names"}{hint}'
+                f'joint {joint!r} is not among {", ".join(map(str, names)) or "no names"}'
             )
     return np.array([names.index(joint) for joint in wanted], dtype=np.intp)
 
 
-def _one_of(row: Table, name: Any, known: Sequence[str]) -> str:
-    """Return a joint of the robot; raise `ConfigError` if it has none of this name."""
-    if name not in known:
-        near = difflib.get_close_matches(str(name), known, n=1)
-        hint = f'; did you mean {near[0]!r}?' if near else ''
-        raise ConfigError(
-            f'{row.origin}: {shown(name)} is no joint of the robot: {", ".join(known)}{hint}'
-        )
-    return str(name)
-
-
-def _words(row: Table, key: str, default: tuple[str, ...]) -> tuple[str, ...]:
-    """Read a list of texts."""
-    found = row.sequence(key, default)
-    if not all(isinstance(each, str) for each in found):
-        raise ConfigError(f'{row.origin}: {key} = {shown(found)} is not allowed: texts are needed')
-    return found
+def _place(row: Table, name: Any, known: Sequence[str]) -> int:
+    """Return the index of a joint; raise `ConfigError` if the robot has none of this name."""
+    try:
+        return known.index(configuration.choice('joint', name, known))
+    except InvalidInput as error:
+        raise ConfigError(f'{row.origin}: {error}') from None
 
 
 def _finite(values: Any, count: int) -> Array:
@@ -582,19 +530,16 @@ def _reader(path: str, origin: str) -> _Read:
     A path has names with dots between them. After a name, ``[2]`` is one element of a list, and
     ``[]`` all of them; ``xyz`` at the end stands for the fields x, y and z.
     """
-    steps: list[tuple[str, str]] = []
-    for word in path.split('.'):
-        match = _STEP.fullmatch(word)
-        if match is None:
-            raise ConfigError(
-                f'{origin}: {path!r} is not allowed: names of fields with dots between them, each'
-                ' with [] or a number in brackets or without, are needed'
-            )
-        steps.append((match[1], match[2] or ''))
+    matches = [re.fullmatch(r'([A-Za-z]\w*)(\[\d*\])?', word) for word in path.split('.')]
+    steps = [(match[1], match[2] or '') for match in matches if match]
+    if len(steps) < len(matches):
+        raise ConfigError(
+            f'{origin}: {path!r} is not allowed: names of fields with dots between them, each'
+            ' with [] or a number in brackets or without, are needed'
+        )
 
     def read(message: Any, at: int = 0) -> Any:
-        for place in range(at, len(steps)):
-            name, index = steps[place]
+        for place, (name, index) in enumerate(steps[at:], at):
             if name == 'xyz' and place == len(steps) - 1:
                 return message.x, message.y, message.z
             message = getattr(message, name)

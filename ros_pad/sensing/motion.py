@@ -101,7 +101,6 @@ class Options(NamedTuple):
     window: float  # s
     samples: int  # in a window
     in_foot_axes: bool
-    late: float  # s, delay of the joints
     rejection: bool
 
 

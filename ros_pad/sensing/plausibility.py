@@ -16,77 +16,77 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array, cross
 from ros_pad.sensing.body_filter import Flags
 
+# Samples of which one is looked at, where that is enough.
 EVERY = 4
-"""Samples of which one is looked at, where that is enough."""
 
+# Time for which a sensor may repeat its reading while the robot moves, s.
 STUCK = 0.2
-"""Time for which a sensor may repeat its reading while the robot moves, s."""
 
+# Time constant of the share of its stances in which a foot slips, s of stance.
 STANCES = 4.0
-"""Time constant of the share of its stances in which a foot slips, s of stance."""
 
+# Share above which a foot moves against the others, if half of all feet are below AGREES.
 AGAINST = 0.9
-"""Share above which a foot moves against the others, if half of all feet are below AGREES."""
 
+# Shares of their stances in which all feet slip, above which they creep while they seem to stick,
+# and above which they show nothing about their radius and the length of their legs.
 SLIPPERY, SLIPS = 0.35, 0.45
-"""Shares of their stances in which all feet slip, above which they creep while they seem to stick,
-and above which they show nothing about their radius and the length of their legs."""
 
+# Share of the time in which no foot sticks, above which feet creep. Where some foot always does,
+# the others may be in the air, with force sensors that read something there.
 NONE_STICKS = 0.03
-"""Share of the time in which no foot sticks, above which feet creep. Where some foot always does,
-the others may be in the air, with force sensors that read something there."""
 
+# Mean speed of its contact point over that of the foot against the body from which on it does.
 FASTER = 0.6
-"""Mean speed of its contact point over that of the foot against the body from which on it does."""
 
+# Speed of a foot against body or ground from which on it shows something, m/s.
 MOVES = 0.02
-"""Speed of a foot against body or ground from which on it shows something, m/s."""
 
+# Share below which a foot moves with the others.
 AGREES = 0.5
-"""Share below which a foot moves with the others."""
 
+# Vertical speed from which on a foot is in the air, m/s.
 SWINGS = 0.1
-"""Vertical speed from which on a foot is in the air, m/s."""
 
+# Number of readings in the air whose median is that of the sensor, and time between them, s.
 READINGS, APART = 20, 0.016
-"""Number of readings in the air whose median is that of the sensor, and time between them, s."""
 
+# Largest median of their distances from it, over it: contacts that last are not alike.
 ALIKE = 0.15
-"""Largest median of their distances from it, over it: contacts that last are not alike."""
 
+# Shares of the expected load up to which readings in the air are left as they are (contacts begin
+# and end while feet move), and above which they are no error of the sensor alone.
 NOTHING, TOO_MUCH = 0.05, 0.5
-"""Shares of the expected load up to which readings in the air are left as they are (contacts begin
-and end while feet move), and above which they are no error of the sensor alone."""
 
+# Time over which joint positions are compared with their velocities, s.
 STRETCH = 0.5
-"""Time over which joint positions are compared with their velocities, s."""
 
+# Largest difference of both, rad, and what is added to it, as a share of the largest motion.
 UNLIKE, UNLIKE_SHARE = 0.08, 0.3
-"""Largest difference of both, rad, and what is added to it, as a share of the largest motion."""
 
+# Delay between IMU and joints above which there is a doubt, s.
 LATE = 2e-3
-"""Delay between IMU and joints above which there is a doubt, s."""
 
+# Standard deviations of the delay that it must be above that.
 SURE = 2.0
-"""Standard deviations of the delay that it must be above that."""
 
+# Error of the estimated delay that slips cause, s.
 LATE_BIAS = 2.5e-4
-"""Error of the estimated delay that slips cause, s."""
 
+# Half of the time over which the gyro is differentiated, s.
 HALF = 0.008
-"""Half of the time over which the gyro is differentiated, s."""
 
+# Length, s, and largest number of stretches of walking that give a delay and its deviation.
 BLOCK, BLOCKS = 2.0, 12
-"""Length, s, and largest number of stretches of walking that give a delay and its deviation."""
 
+# Stretches of walking without which no delay is known.
 FEWEST = 4
-"""Stretches of walking without which no delay is known."""
 
+# Difference of foot velocities above which one of them slips, m/s.
 LARGEST = 0.1
-"""Difference of foot velocities above which one of them slips, m/s."""
 
+# Sum of squared differences of feet's accelerations, m²/s⁴, that a stretch of walking needs.
 LEAST = 10.0
-"""Sum of squared differences of feet's accelerations, m²/s⁴, that a stretch of walking needs."""
 
 
 class Repeats:
@@ -245,33 +245,6 @@ class Joints:
     def _restart(self, time: float, q: Array) -> None:
         self._begin, self._first = time, q
         self._path, self._apart, self._most = np.zeros((3, *q.shape))
-
-
-class Shift:
-    """Readings of one sensor as they were some time ago.
-
-    Parameters
-    ----------
-    delay : float
-        That time, s.
-    """
-
-    def __init__(self, delay: float) -> None:
-        self._delay = delay
-        self._rows: deque[tuple[float, list[Array]]] = deque()
-
-    def update(self, time: float, readings: list[Array]) -> list[Array]:
-        """Add readings, and return those of that time ago, on a line between samples."""
-        rows = self._rows
-        if rows and time < rows[-1][0]:
-            rows.clear()
-        rows.append((time, readings))
-        wanted = time - self._delay
-        while len(rows) > 2 and rows[1][0] <= wanted:
-            rows.popleft()
-        (before, first), (after, second) = rows[0], rows[min(1, len(rows) - 1)]
-        share = min(max((wanted - before) / max(after - before, 1e-9), 0.0), 1.0)
-        return [a + share * (b - a) for a, b in zip(first, second, strict=True)]
 
 
 class Legs:

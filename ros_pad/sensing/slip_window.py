@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from ros_pad.robots.rotation import Array
 
+# Length of the short window over that of the long one: whether a foot has come to rest is known
+# sooner than its speed.
 SHORT = 0.4
-"""Length of the short window over that of the long one: whether a foot has come to rest is known
-sooner than its speed."""
 
 
 class SlipWindow:

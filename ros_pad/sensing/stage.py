@@ -22,39 +22,40 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array, matrix, skew
 from ros_pad.sensing.estimator import UNKNOWN_BIAS, WEIGHT, BodyEstimate, BodyEstimator
 
+# Difference of time stamps up to which readings are of one moment, ns: joints 4 ms later than the
+# IMU triple the error of the body's velocity.
 SAME_NS = 1_000_000
-"""Difference of time stamps up to which readings are of one moment, ns: joints 4 ms later than the
-IMU triple the error of the body's velocity."""
 
+# Difference of the stamps of IMU and joints above which they cannot be paired, ns.
 APART_NS = 5_000_000
-"""Difference of the stamps of IMU and joints above which they cannot be paired, ns."""
 
+# Age above which the force of a foot is not used any more, ns.
 OLDEST_FORCE_NS = 20_000_000
-"""Age above which the force of a foot is not used any more, ns."""
 
+# Longest time over which positions of joints are differentiated, s.
 LONGEST_DIFFERENCE = 0.05
-"""Longest time over which positions of joints are differentiated, s."""
 
+# Step back of a stamp from which on a clock has been set back, ns; less is a late message.
 SET_BACK_NS = 100_000_000
-"""Step back of a stamp from which on a clock has been set back, ns; less is a late message."""
 
+# Longest time for which the first sample waits until the robot is calm, s: one reading in a jolt
+# would begin odom with a wrong tilt.
 START = 0.2
-"""Longest time for which the first sample waits until the robot is calm, s: one reading in a jolt
-would begin odom with a wrong tilt."""
 
+# Readings in a row that are calm before estimation begins.
 CALM = 5
-"""Readings in a row that are calm before estimation begins."""
 
+# Largest difference of the specific force from gravity, m/s², and largest rates of body and
+# joints, rad/s, of a calm robot.
 _CALM_PULL, _CALM_RATE, _CALM_JOINTS = 0.5, 0.1, 0.3
-"""Largest difference of the specific force from gravity, m/s², and largest rates of body and
-joints, rad/s, of a calm robot."""
 
+# Time without a sample after which there is a doubt, s.
 SILENCE = 0.4
-"""Time without a sample after which there is a doubt, s."""
 
+# Sources of the forces: sensors of the feet, efforts of the joints, or the first that comes.
 FORCES = ('auto', 'feet', 'efforts')
-"""Sources of the forces: sensors of the feet, efforts of the joints, or the first that comes."""
 
+# Settings of a body estimator and its stage, by the names of their arguments.
 SETTINGS = (
     Setting(
         'gyro_noise', 0.005, 'Standard deviation of a sample of the gyro.', 'rad/s', 1e-6, 1.0
@@ -99,7 +100,6 @@ SETTINGS = (
     Setting('window', 0.02, 'Time over which slip velocities are averaged.', 's', 0.0, 1.0),
     Setting('rate', 250.0, 'Samples a second that are expected.', 'Hz', 10.0, 1e4),
 )  # fmt: skip
-"""Settings of a body estimator and its stage, by the names of their arguments."""
 
 _Values: TypeAlias = Sequence[float] | npt.NDArray[np.float64]
 
@@ -186,14 +186,13 @@ class JointOrder:
 
     def _found(self, names: tuple[str, ...]) -> npt.NDArray[np.intp]:
         """Return where each joint of the robot is among names."""
-        places = {name: place for place, name in enumerate(names)}
-        missing = [name for name in self._robot.joint_names if name not in places]
-        if missing or len(places) < len(names):
+        missing = [name for name in self._robot.joint_names if name not in names]
+        if missing or len(set(names)) < len(names):
             wrong = f'without {", ".join(missing)}' if missing else 'with a name twice'
             raise InvalidInput(
                 f'joint names {wrong} are not allowed: those of {self._robot.name} are needed'
             )
-        return np.array([places[name] for name in self._robot.joint_names])
+        return np.array([names.index(name) for name in self._robot.joint_names])
 
 
 def twist_of(estimate: BodyEstimate, rate: Array, gyro_noise: float) -> tuple[Array, Array]:
@@ -233,11 +232,6 @@ class _Joints(NamedTuple):
     positions: Array
     velocities: Array
     efforts: Array | None
-
-
-class _Force(NamedTuple):
-    stamp_ns: int
-    force: Array
 
 
 class _Outputs(NamedTuple):
@@ -332,7 +326,7 @@ class SensingStage:
         self._inertial: deque[_Inertial] = deque(maxlen=_WAITING)
         self._waiting: deque[_Joints] = deque(maxlen=_WAITING)
         self._last_positions: tuple[int, Array] | None = None
-        self._forces: list[deque[_Force]] = [deque(maxlen=_WAITING) for _ in robot.legs]
+        self._forces: list[deque[tuple[int, Array]]] = [deque(maxlen=_WAITING) for _ in robot.legs]
         self._start = _Start()
         self._since = _Since()
 
@@ -348,24 +342,13 @@ class SensingStage:
         accelerometer : array (3,)
             Specific force in the axes of the IMU, m/s², +9.81 upwards at rest.
         """
-        try:
-            reading = _Inertial(
-                stamp_ns,
-                _checked('gyro', gyro, 3, 'rad/s'),
-                _checked('accelerometer', accelerometer, 3, 'm/s2'),
-            )
-        except InvalidInput as error:
-            self.reject(error)
-            return
-        self._since.received['IMU'] += 1
-        last = self._inertial[-1].stamp_ns if self._inertial else -math.inf
-        if stamp_ns <= last:
-            if stamp_ns > last - SET_BACK_NS:
-                return  # it came twice, or late
-            self._inertial.clear()
-        self._since.fresh['IMU'] += 1
-        self._inertial.append(reading)
-        self._process()
+        given = self._checked(
+            ('gyro', gyro, 3, 'rad/s'), ('accelerometer', accelerometer, 3, 'm/s2')
+        )
+        last_ns = self._inertial[-1].stamp_ns if self._inertial else _NEVER
+        if given and self._fresh('IMU', stamp_ns, last_ns, self._inertial):
+            self._inertial.append(_Inertial(stamp_ns, *given))
+            self._process()
 
     def joints(
         self,
@@ -388,37 +371,60 @@ class SensingStage:
             Torques, N m.
         """
         size = len(self._robot.joint_names)
-        try:
-            q = _checked('joint positions', positions, size, 'rad')
-            dq = None
-            if velocities is not None:
-                dq = _checked('joint velocities', velocities, size, 'rad/s')
-            torques = None
-            if efforts is not None:
-                torques = _checked('efforts', efforts, size, 'N m')
-        except InvalidInput as error:
-            self.reject(error)
+        names = (('joint positions', 'rad'), ('joint velocities', 'rad/s'), ('efforts', 'N m'))
+        values = {
+            name: (name, each, size, unit)
+            for (name, unit), each in zip(names, (positions, velocities, efforts), strict=True)
+            if each is not None
+        }
+        checked = self._checked(*values.values())
+        if checked is None:
             return
-        self._since.received['joints'] += 1
-        last_ns, before = self._last_positions or (stamp_ns - 1, q)
-        if stamp_ns <= last_ns:
-            if stamp_ns > last_ns - SET_BACK_NS:
-                return
-            self._waiting.clear()
-            before = q
-        self._since.fresh['joints'] += 1
+        given = dict(zip(values, checked, strict=True))
+        q, dq = given['joint positions'], given.get('joint velocities')
+        last_ns, before = self._last_positions or (_NEVER, q)
+        if not self._fresh('joints', stamp_ns, last_ns, self._waiting):
+            return
+        self._last_positions = stamp_ns, q
         self.differentiates = dq is None
         if dq is None:
             dt = (stamp_ns - last_ns) * 1e-9
-            self._last_positions = stamp_ns, q
-            if before is q or not 0.0 < dt <= LONGEST_DIFFERENCE:
+            if not 0.0 < dt <= LONGEST_DIFFERENCE:
                 return  # the next reading has one before it
             dq = (q - before) / dt
-        self._last_positions = stamp_ns, q
         while self._waiting and self._waiting[0].stamp_ns < stamp_ns - _LATEST_NS:
             self._waiting.popleft()
-        self._waiting.append(_Joints(stamp_ns, q, dq, torques))
+        self._waiting.append(_Joints(stamp_ns, q, dq, given.get('efforts')))
         self._process()
+
+    def _checked(self, *readings: tuple[str, npt.ArrayLike, int, str]) -> list[Array] | None:
+        """Return readings, each with name, values, size and unit, as arrays.
+
+        Reject those that no sensor can have, and return None.
+        """
+        found = []
+        try:
+            for name, values, size, unit in readings:
+                found.append(quantity(name, values, unit, -1e6, 1e6))
+                if found[-1].shape != (size,):
+                    raise InvalidInput(
+                        f'{name} of shape {found[-1].shape} is not allowed: {size} numbers are'
+                        ' needed'
+                    )
+        except InvalidInput as error:
+            self.reject(error)
+            return None
+        return found
+
+    def _fresh(self, source: str, stamp_ns: int, last_ns: int, kept: deque[Any]) -> bool:
+        """Return whether a reading is neither late nor double; forget those of a later clock."""
+        self._since.received[source] += 1
+        if stamp_ns <= last_ns:
+            if stamp_ns > last_ns - SET_BACK_NS:
+                return False
+            kept.clear()
+        self._since.fresh[source] += 1
+        return True
 
     def force(self, leg_index: int, stamp_ns: int, force: Sequence[float]) -> None:
         """Process the force of the ground on a foot.
@@ -432,15 +438,13 @@ class SensingStage:
         force : sequence of 3 floats
             Force in the axes of its sensor, N.
         """
-        try:
-            reading = _Force(stamp_ns, _checked('foot force', force, 3, 'N'))
-        except InvalidInput as error:
-            self.reject(error)
+        given = self._checked(('foot force', force, 3, 'N'))
+        if given is None:
             return
         kept = self._forces[leg_index]
-        if kept and stamp_ns <= kept[-1].stamp_ns - SET_BACK_NS:
+        if kept and stamp_ns <= kept[-1][0] - SET_BACK_NS:
             kept.clear()
-        kept.append(reading)
+        kept.append((stamp_ns, given[0]))
         self._process()
 
     def reject(self, error: InvalidInput) -> None:
@@ -521,31 +525,20 @@ class SensingStage:
 
     def _has_forces(self, stamp_ns: int) -> bool:
         """Return whether the forces of a moment are there, or none are awaited."""
-        last = [kept[-1].stamp_ns if kept else _NEVER for kept in self._forces]
+        last = [kept[-1][0] if kept else _NEVER for kept in self._forces]
         if self._source == 'efforts' or max(last) < stamp_ns - OLDEST_FORCE_NS:
             return True
         return min(last) >= stamp_ns - SAME_NS
 
     def _forces_at(self, stamp_ns: int) -> Array | None:
-        """Return the last forces of all feet up to a time, (legs, 3), N; None if one is too old.
-
-        Forces that are all too late are reported.
-        """
+        """Return the last forces of all feet at a time, (legs, 3), N; None if one is too old."""
         found = []
         for kept in self._forces:
-            past = (each for each in reversed(kept) if each.stamp_ns <= stamp_ns + SAME_NS)
-            force = next(past, None)
-            if force is None or force.stamp_ns < stamp_ns - OLDEST_FORCE_NS:
-                early = kept[0].stamp_ns - stamp_ns if kept else 0
-                if early > OLDEST_FORCE_NS:
-                    self._out.error(
-                        InvalidInput(
-                            f'foot force: its stamp is {early * 1e-6:.3g} ms after that of the'
-                            f' joints: at most {SAME_NS * 1e-6:g} ms is allowed'
-                        )
-                    )
+            past = (each for each in reversed(kept) if each[0] <= stamp_ns + SAME_NS)
+            last_ns, force = next(past, (_NEVER, None))
+            if force is None or last_ns < stamp_ns - OLDEST_FORCE_NS:
                 return None
-            found.append(force.force)
+            found.append(force)
         return np.array(found)
 
     def _starts(self, joints: _Joints, inertial: _Inertial) -> bool:
@@ -606,16 +599,6 @@ def _between(before: _Inertial, after: _Inertial, stamp_ns: int) -> _Inertial | 
         before.gyro + share * (after.gyro - before.gyro),
         before.accelerometer + share * (after.accelerometer - before.accelerometer),
     )
-
-
-def _checked(name: str, values: npt.ArrayLike, size: int, unit: str) -> Array:
-    """Return values as an array; raise `InvalidInput` for those that no sensor can have."""
-    given = quantity(name, values, unit, -1e6, 1e6)
-    if given.shape != (size,):
-        raise InvalidInput(
-            f'{name} of shape {given.shape} is not allowed: {size} numbers are needed'
-        )
-    return given
 
 
 def _finite(estimate: BodyEstimate) -> bool:

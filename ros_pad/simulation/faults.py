@@ -92,11 +92,11 @@ KINDS = tuple(_QUANTITIES)
 BODY_KINDS = ('imu_silent', 'joints_silent')
 """Kinds of fault of the sensors of a body with joints."""
 
-SENSOR_KINDS = (
-    *(kind for kind in KINDS if kind.startswith(('force', 'marker'))),
-    *BODY_KINDS,
-)
-"""Kinds of fault of sensors of feet and body."""
+FOOT_KINDS = tuple(kind for kind in KINDS if kind.startswith(('force', 'marker')))
+"""Kinds of fault of the sensors of a foot."""
+
+AIR_KINDS = ('stuck_valve', 'supply_loss', 'leak', 'sensor_drift', 'silence')
+"""Kinds of fault of a regulator, its line and its pad."""
 
 
 @dataclass(frozen=True)
@@ -154,17 +154,14 @@ class Fault:
                 f'legs = {self.legs!r} is not allowed: a fault of kind {self.kind} is of the body'
             )
         own = _QUANTITIES[self.kind]
-        for quantities in _QUANTITIES.values():
-            for name in quantities:
-                value = getattr(self, name)
-                if name in own:
-                    unit, low, high, _ = own[name]
-                    number(name, value, unit, low, high)
-                elif value:
-                    raise InvalidInput(
-                        f'{name} = {value!r} is not allowed: a fault of kind {self.kind} has no'
-                        f' {name}'
-                    )
+        for name in ('pressure', 'time_constant', 'conductance', 'offset', 'rise', 'load'):
+            value = getattr(self, name)
+            if name in own:
+                number(name, value, *own[name][:3])
+            elif value:
+                raise InvalidInput(
+                    f'{name} = {value!r} is not allowed: a fault of kind {self.kind} has none'
+                )
 
     @classmethod
     def read(cls, table: Table) -> Fault:
@@ -175,25 +172,18 @@ class Fault:
         ConfigError
             When a key is missing or unknown, or a value is not allowed.
         """
-        kind = table.choice('kind', KINDS)
-        start = table.number('start', 's', 0.0, LATEST, default=0.0)
-        end = math.inf
-        if 'end' in table:
-            end = table.number('end', 's', math.nextafter(start, math.inf), LATEST)
-        fault = cls(
-            kind=kind,
-            start=start,
-            end=end,
-            legs=tuple(table.value(_LEGS)) if 'legs' in table else (),
-            **{
-                name: table.number(
-                    name, unit, low, high, **({} if default is None else {'default': default})
-                )
-                for name, (unit, low, high, default) in _QUANTITIES[kind].items()
-            },
-        )
+        own = _QUANTITIES[kind := table.choice('kind', KINDS)]
+        values: dict[str, Any] = {name: each[3] for name, each in own.items()}
+        for name in ('start', 'end', *own):
+            if name in table or values.get(name, 0.0) is None:
+                values[name] = table.number(name, '')
+        if 'legs' in table:
+            values['legs'] = tuple(table.value(_LEGS))
         table.finish()
-        return fault
+        try:
+            return cls(kind, **values)
+        except InvalidInput as error:
+            raise ConfigError(f'{table.origin}: {error}') from None
 
     @classmethod
     def parse(cls, text: str) -> Fault:
@@ -303,23 +293,12 @@ def listed(table: Table) -> tuple[Fault, ...]:
     )
 
 
-def faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
-    """Return those of the faults that are of the regulator, line or pad of a leg."""
+def faults_of(
+    leg: int, faults: Iterable[Fault], kinds: Sequence[str] = AIR_KINDS
+) -> tuple[Fault, ...]:
+    """Return those of the faults that a leg has, of the given kinds."""
     return tuple(
-        fault
-        for fault in faults
-        if fault.kind not in SENSOR_KINDS and (not fault.legs or leg in fault.legs)
-    )
-
-
-def sensor_faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
-    """Return those of the faults that are of the sensors of a leg's foot."""
-    return tuple(
-        fault
-        for fault in faults
-        if fault.kind in SENSOR_KINDS
-        and fault.kind not in BODY_KINDS
-        and (not fault.legs or leg in fault.legs)
+        fault for fault in faults if fault.kind in kinds and (not fault.legs or leg in fault.legs)
     )
 
 
@@ -331,15 +310,11 @@ def parsed(faults: Sequence[Fault | str]) -> tuple[Fault, ...]:
     ConfigError
         When a text does not describe a fault.
     InvalidInput
-        When ``faults`` is not a list, or one of them is a fault of a foot's sensors.
+        When ``faults`` is not a list, or one of them is a fault of sensors of foot or body.
     """
     if isinstance(faults, str) or not isinstance(faults, Sequence):
         raise InvalidInput(f'faults = {faults!r} is not allowed: a list of faults is needed')
     found = tuple(each if isinstance(each, Fault) else Fault.parse(each) for each in faults)
     for fault in found:
-        if fault.kind in SENSOR_KINDS:
-            raise InvalidInput(
-                f'faults: kind = {fault.kind!r} is not allowed: it is a fault of the sensors of a'
-                f' {"body" if fault.kind in BODY_KINDS else "foot"}, not of a regulator'
-            )
+        choice('faults: kind', fault.kind, AIR_KINDS)
     return found

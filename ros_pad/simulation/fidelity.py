@@ -12,12 +12,10 @@ from __future__ import annotations
 import functools
 import importlib.util
 import math
-import pathlib
 from dataclasses import dataclass
 from typing import Any
 
-from ros_pad import configuration
-from ros_pad.configuration import Table, choice
+from ros_pad.configuration import choice, shared_folder
 from ros_pad.contact import LARGE_PAD
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation.full_robot import FullRobot
@@ -26,8 +24,9 @@ from ros_pad.simulation.margin import features, reserve
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.scene import RAIL_LEG, LeggedBody, RailGait, Scene
+from ros_pad.simulation.scene import RAIL_LEG, LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
+from ros_pad.yaml_text import read_yaml
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')
 
@@ -39,8 +38,6 @@ FRICTION = 'friction'
 
 LEAST = 1e-4
 """Error that is added to every error, so that its logarithm is finite; no bound is below it."""
-
-_REMEDY = ': write the file again with python -m studies fidelity'
 
 
 @dataclass(frozen=True)
@@ -72,110 +69,63 @@ class Promises:
 
     Attributes
     ----------
-    ranges : dict of dict
-        For each robot and each value of a scene (dotted name), lowest and highest value drawn.
-    spans : dict of dict
-        For each robot and feature, its lowest and highest value in the scenes drawn.
-    lines : dict of dict
-        For each robot, and level and metric: constant and slopes, by feature, of the logarithm of
-        the bound.
+    robots : dict
+        For each robot ``ranges``: lowest and highest of each value of a scene (dotted name) that
+        was drawn; ``features``: of each feature; and ``bounds``: for each level and metric,
+        constant and slopes, by feature, of the logarithm of the bound.
     """
 
-    ranges: dict[str, dict[str, tuple[float, float]]]
-    spans: dict[str, dict[str, tuple[float, float]]]
-    lines: dict[str, dict[str, dict[str, float]]]
+    robots: dict[str, dict[str, dict[str, Any]]]
 
     @classmethod
     @functools.cache
     def load(cls) -> Promises:
-        """Read ``config/fidelity.yaml``.
-
-        Raises
-        ------
-        ConfigError
-            When the file is missing or is not as ``python -m studies fidelity`` writes it.
-        """
-        found = cls({}, {}, {})
+        """Read ``config/fidelity.yaml``; raise `ConfigError` if it is missing or not YAML."""
+        path = shared_folder() / 'fidelity.yaml'
         try:
-            table = Table.load(_file())
-            with table.table('robots') as robots:
-                for robot in robots.keys:
-                    with robots.table(robot) as own:
-                        found._read(robot, own)
-        except ConfigError as error:
-            raise ConfigError(f'{error}{_REMEDY}') from error
-        return found
-
-    def _read(self, robot: str, table: Table) -> None:
-        for key, pairs in (('ranges', self.ranges), ('features', self.spans)):
-            with table.table(key) as part:
-                ends = {name: part.vector(name, '', 2).tolist() for name in part.keys}
-            pairs[robot] = {name: (low, high) for name, (low, high) in ends.items()}
-        self.lines[robot] = {}
-        with table.table('bounds') as bounds:
-            for level in bounds.keys:
-                with bounds.table(level) as line:
-                    names = ('constant', *self.spans[robot])
-                    self.lines[robot][level] = {name: line.number(name, '') for name in names}
-
-    def _features(self, scene: Scene, policy: str | None) -> dict[str, float]:
-        """Return the features of a scene; raise `ConfigError` if the file has others."""
-        found = features(scene, policy)
-        if found.keys() != self.spans[scene.robot].keys():
+            return cls(read_yaml(path.read_text(encoding='utf-8'))['robots'])
+        except Exception as error:  # YAML has many
             raise ConfigError(
-                f'{_file()}: robots: {scene.robot}: features are'
-                f' {", ".join(self.spans[scene.robot])}, needed are {", ".join(found)}{_REMEDY}'
-            )
-        return found
+                f'{path}: {error}: write the file again with python -m studies fidelity'
+            ) from error
 
     def bound(self, level: str, scene: Scene, policy: str | None = None) -> float:
         """Return the bound on the error of a level, at least LEAST; infinite if none was drawn."""
-        line = self.lines.get(scene.robot, {}).get(f'{level} {scene.metric}')
+        bounds = self.robots.get(scene.robot, {}).get('bounds', {})
+        line = bounds.get(f'{level} {scene.metric}')
         if line is None:
             return math.inf
-        known = self._features(scene, policy)
+        known = features(scene, policy)
         power = line['constant'] + sum(line[name] * value for name, value in known.items())
         return max(LEAST, math.exp(min(power, 700.0)) - LEAST)
 
     def beyond(self, scene: Scene, policy: str | None = None) -> str:
         """Return as text what of a scene is outside the ranges drawn; empty if nothing is."""
-        if scene.robot not in self.ranges:
-            return f'robot = {scene.robot}, drawn were {", ".join(self.ranges)}'
+        if scene.robot not in self.robots:
+            return f'robot = {scene.robot}, drawn were {", ".join(self.robots)}'
+        drawn = self.robots[scene.robot]
         unused: tuple[str, ...] = () if scene.tow.weight else ('tow.',)
         if scene.floor.kind != 'patches':
             unused += ('floor.wet_fraction', 'floor.patch_length')
-        try:
-            rows = [
-                (name, value_of(scene, name), ends)
-                for name, ends in self.ranges[scene.robot].items()
-                if not name.startswith(unused)
-            ]
-        except AttributeError as error:
-            raise ConfigError(
-                f'{_file()}: robots: {scene.robot}: ranges: of a scene, {error}{_REMEDY}'
-            ) from error
-        known = self._features(scene, policy)
-        rows += [(name, known[name], ends) for name, ends in self.spans[scene.robot].items()]
+        known: dict[str, Any] = features(scene, policy)
+        known |= {n: value_of(scene, n) for n in drawn['ranges'] if not n.startswith(unused)}
         found = [
-            f'{name} = {value:.4g}, drawn from {low:.4g} to {high:.4g}'
-            for name, value, (low, high) in rows
-            if value is not None and not low - 1e-9 * abs(low) <= value <= high + 1e-9 * abs(high)
+            f'{name} = {known[name]:.4g}, drawn from {low:.4g} to {high:.4g}'
+            for name, (low, high) in (drawn['ranges'] | drawn['features']).items()
+            if known.get(name) is not None
+            and not low - 1e-9 * abs(low) <= known[name] <= high + 1e-9 * abs(high)
         ]
-        if (scene.foot.pad, scene.foot.limit) != (LARGE_PAD, 'measured'):
-            found.append('pads, drawn were large ones with the force limit as measured')
-        if 'hose_conductance' in scene.regulator:
-            found.append('a measured conductance of the hose, of which none were drawn')
-        if scene.faults:
-            found.append('faults, of which none were drawn')
-        if scene.floor.kind == 'drawn':
-            found.append('a floor as in a drawing, of which none were drawn')
-        if isinstance(scene.gait, WalkingGait) and not _walks_as_usual(scene):
-            found.append(f'phases or pushes of the gait, drawn were those of {scene.robot}')
+        usual = (scene.foot.pad, scene.foot.limit) == (LARGE_PAD, 'measured')
+        for word, holds in {
+            'pads, drawn were large ones with the force limit as measured': not usual,
+            'a measured conductance of the hose': 'hose_conductance' in scene.regulator,
+            'faults': scene.faults,
+            'a floor as in a drawing': scene.floor.kind == 'drawn',
+            f'phases or pushes of the gait, drawn were those of {scene.robot}': not _usual(scene),
+        }.items():
+            if holds:
+                found.append(word)
         return ', '.join(found)
-
-
-def _file() -> pathlib.Path:
-    return configuration.shared_folder() / 'fidelity.yaml'
 
 
 def value_of(scene: Scene, name: str) -> Any:
@@ -186,17 +136,17 @@ def value_of(scene: Scene, name: str) -> Any:
     return found
 
 
-def _walks_as_usual(scene: Scene) -> bool:
+def _usual(scene: Scene) -> bool:
     """Return whether the gait has the phases and pushes that walked in the study."""
-    assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
-    usual, gait = scene.body.robot.gait, scene.gait
+    gait = scene.gait
+    if not isinstance(gait, WalkingGait):
+        return True
+    assert isinstance(scene.body, LeggedBody)
+    usual = scene.body.robot.gait
     if usual is None or not gait.pushes:
         return False
-    apart = (
-        a - b - (gait.middles[0] - usual.phases[0])
-        for a, b in zip(gait.middles, usual.phases, strict=True)
-    )
-    return all(abs(math.remainder(each, 1.0)) < 1e-6 for each in apart)
+    shifts = [a - b for a, b in zip(gait.middles, usual.phases, strict=True)]
+    return all(abs(math.remainder(each - shifts[0], 1.0)) < 1e-6 for each in shifts)
 
 
 def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> ChosenLevel:
@@ -219,8 +169,7 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
     InvalidInput
         When the level does not exist, or does not model the scene's robot.
     """
-    known = _levels(scene, fidelity)
-    promises = Promises.load()
+    known, promises = _levels(scene, fidelity), Promises.load()
     beyond = promises.beyond(scene, policy)
     bounds = {
         level: math.inf if beyond else promises.bound(level, scene, policy)
@@ -233,10 +182,7 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         enough = [each for each in available if bounds[each] <= scene.accuracy]
         level = (enough or available[-1:])[0]
     bound = bounds[level]
-    if beyond:
-        within = f'of unknown error ({beyond})'
-    else:
-        within = f'{_within(bound)} of the top level, promised for 95 of 100 scenes'
+    within = f'of unknown error ({beyond})' if beyond else _promised(bound)
     note = f'{_grip(scene, policy)}: the {scene.metric} on {level} is {within}'
     if bound > scene.accuracy:
         note += f', but the scene requires {100.0 * scene.accuracy:.3g} %'
@@ -259,22 +205,23 @@ def answer(scene: Scene, policy: str | None = None) -> ChosenLevel | None:
     if bound > scene.accuracy:
         return None
     note = (
-        f'{_grip(scene, policy)}: the {scene.metric} of feet that never slip is {_within(bound)}'
-        ' of the top level, promised for 95 of 100 scenes; nothing was simulated'
+        f'{_grip(scene, policy)}: the {scene.metric} of feet that never slip is'
+        f' {_promised(bound)}; nothing was simulated'
     )
     return ChosenLevel(STICKING, bound, note)
 
 
 def sticking_distance(scene: Scene) -> float:
     """Return how far the body of a scene goes if its feet never slip, m."""
-    gait = scene.gait
-    if isinstance(gait, RailGait):
-        return scene.cycles * gait.stroke
-    return gait.body_advance(scene.cycles * gait.cycle)
+    return scene.gait.body_advance(scene.cycles * scene.gait.cycle)
 
 
 def _grip(scene: Scene, policy: str | None) -> str:
     return f'grip capacity {reserve(scene, policy):.2g} times the demand'
+
+
+def _promised(bound: float) -> str:
+    return f'{_within(bound)} of the top level, promised for 95 of 100 scenes'
 
 
 def _within(bound: float) -> str:
@@ -282,8 +229,8 @@ def _within(bound: float) -> str:
     percent = 100.0 * bound
     if percent > 99.0:
         return f'off by up to {max(percent, 100.0):.0f} %'
-    unit = 10.0 ** (math.floor(math.log10(max(percent, 1e-3))) - 1)
-    return f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %'
+    digits = 0 if percent > 9.95 else 1
+    return f'within {math.ceil(percent * 10**digits - 1e-9) / 10**digits:g} %'
 
 
 def level(
@@ -293,19 +240,15 @@ def level(
 
     With ``joints`` it must be one with joints: ``auto`` takes L2, others are refused.
     """
-    if joints:
-        known = _levels(scene, fidelity)
-        if fidelity not in ('auto', 'L2') or 'L2' not in known:
-            given = f'scene {scene.name!r}' if 'L2' not in known else f'fidelity = {fidelity!r}'
-            raise InvalidInput(
-                f"sensing = 'joints' is not allowed with {given}: it needs fidelity L2, which"
-                ' has joints'
-            )
-        return 'L2'
-    if fidelity == 'auto':
-        return choose(scene, fidelity, policy).level
-    _levels(scene, fidelity)
-    return fidelity
+    known = _levels(scene, fidelity)
+    if not joints:
+        return choose(scene, fidelity, policy).level if fidelity == 'auto' else fidelity
+    if fidelity not in ('auto', 'L2') or 'L2' not in known:
+        raise InvalidInput(
+            f"sensing = 'joints' is not allowed with fidelity = {fidelity!r} of scene"
+            f' {scene.name!r}: it needs fidelity L2, which has joints'
+        )
+    return 'L2'
 
 
 def _levels(scene: Scene, fidelity: str) -> tuple[str, ...]:
@@ -334,8 +277,5 @@ def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> 
         For L2 when MuJoCo is missing, or the scene cannot be built as :class:`FullRobot`.
     """
     name = level(scene, fidelity)
-    if name == 'L0':
-        return RailLeg(scene, floor, period)
-    if name == 'L1':
-        return PlanarRobot(scene, floor, period)
-    return FullRobot(scene, floor, period)
+    made = {'L0': RailLeg, 'L1': PlanarRobot, 'L2': FullRobot}[name]
+    return made(scene, floor, period)

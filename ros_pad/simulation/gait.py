@@ -48,6 +48,11 @@ class WalkingGait:
     middles: tuple[float, ...]
     pushes: bool
 
+    @property
+    def stance(self) -> float:
+        """Duration of a stance, s."""
+        return self.duty * self.cycle
+
     @cached_property
     def fewest(self) -> int:
         """Fewest legs that stand at once, at least 1."""
@@ -141,8 +146,7 @@ class FootPath:
         self._reach = gait.reach()
         self._advance = gait.body_advance(0.0)
         # Legs of one group have one phase: only that of the first of them is computed.
-        self._firsts = [gait.middles.index(each) for each in dict.fromkeys(gait.middles)]
-        self._groups = [self._firsts.index(gait.middles.index(each)) for each in gait.middles]
+        self._firsts = [gait.middles.index(each) for each in gait.middles]
         self._offsets: list[tuple[float, float]] = []
         for leg in range(len(homes)):
             phase = gait.phase(leg, 0.0)
@@ -160,12 +164,12 @@ class FootPath:
         """Move the feet to a time of the gait, s, to turn the body by an angle, rad, meanwhile."""
         before, self._advance = self._advance, self._gait.body_advance(time)
         advance = self._advance - before
-        strokes = [self._gait.stroke(first, time) for first in self._firsts]
+        own = {first: self._gait.stroke(first, time) for first in {*self._firsts}}
+        strokes = [own[first] for first in self._firsts]
         offsets, feet, swings = self._offsets, self.feet, self.swings
-        self.swings = [strokes[group] is not None for group in self._groups]
-        places = zip(self._homes, offsets, self._groups, strict=True)
-        for index, ((home_x, home_y, height), (x, y), group) in enumerate(places):
-            stroke = strokes[group]
+        self.swings = [stroke is not None for stroke in strokes]
+        places = zip(self._homes, offsets, strokes, strict=True)
+        for index, ((home_x, home_y, height), (x, y), stroke) in enumerate(places):
             if stroke is None:
                 # The foot moves in the body against the motion of the body.
                 x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)

@@ -8,14 +8,12 @@ and not on others.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
-from ros_pad.contact import inflate, pressure_for, trapped_film
+from ros_pad.contact import pressure_for
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.squeeze import DIMPLE, TRAPPED, dome_dimple
 from ros_pad.errors import NoEquilibrium
-from ros_pad.simulation.scene import LeggedBody, RailGait, Scene
+from ros_pad.simulation.scene import LeggedBody, RailBody, RailGait, Scene
 
 SOLE_MODULUS = 3.95e5
 """Reduced modulus of a sole whose foot names no material, Pa: of Dragon Skin 10, four times its
@@ -37,10 +35,11 @@ def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
     policy : str or None
         Policy of the feet; None takes the scene's own.
     """
-    policy = scene.policy if policy is None else policy
-    grip, (gait, load, slope) = least_grip(scene, policy), demands(scene)
+    policy = policy or scene.policy
+    (gait, load, slope), body = demands(scene), scene.body
     demand = gait + load + slope
-    margin = math.log(max(grip / demand, 1e-9))  # feet without friction have no grip at all
+    # Feet without friction have no grip at all.
+    margin = math.log(max(least_grip(scene, policy) / demand, 1e-9))
     wet = {'dry': 0.0, 'wet': 1.0}.get(scene.floor.kind, scene.floor.wet_fraction)
     found = {
         'margin': margin,
@@ -51,10 +50,8 @@ def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
         'wet': wet,
         'domes': float(policy == 'dome' or (policy != 'flat' and wet > 0.0)),
     }
-    if isinstance(scene.gait, RailGait):
+    if isinstance(scene.gait, RailGait) or isinstance(body, RailBody):
         return found
-    body = scene.body
-    assert isinstance(body, LeggedBody)
     return found | {
         'climbed': slope / demand,
         'adapts': float(policy not in ('flat', 'dome') and 0.0 < wet < 1.0),
@@ -89,13 +86,13 @@ def reserve(scene: Scene, policy: str | None = None) -> float:
 
 def least_grip(scene: Scene, policy: str) -> float:
     """Return the tangential capacity of all feet, N, on the ground where it is least."""
+    body, domes = scene.body, policy == 'dome'
     grip = min(
-        mid_stance_grip(scene, policy == 'dome' or (policy != 'flat' and wet), wet)
-        for wet in grounds(scene)
+        mid_stance_grip(scene, domes or (policy != 'flat' and wet), wet) for wet in grounds(scene)
     )
-    if not isinstance(scene.body, LeggedBody):
-        return grip * scene.body.load
-    return grip * scene.body.mass * GRAVITY * math.cos(scene.floor.slope)
+    if isinstance(body, LeggedBody):
+        return grip * body.mass * GRAVITY * math.cos(scene.floor.slope)
+    return grip * body.load
 
 
 def grounds(scene: Scene) -> tuple[bool, ...]:
@@ -105,29 +102,20 @@ def grounds(scene: Scene) -> tuple[bool, ...]:
 
 def demands(scene: Scene) -> tuple[float, float, float]:
     """Return what gait, drag and slope need of the feet at most, N."""
-    body, gait, slope, tow = scene.body, scene.gait, scene.floor.slope, scene.tow
-    if isinstance(gait, RailGait) or not isinstance(body, LeggedBody):
-        assert isinstance(gait, RailGait) and not isinstance(body, LeggedBody)
-        peak = 0.5 * gait.stroke * (math.pi / gait.stance) ** 2
-        uphill = body.mass * GRAVITY * abs(math.sin(slope))
-        return body.mass * peak, body.rolling_drag, uphill
+    body, slope, tow = scene.body, scene.floor.slope, scene.tow
     mass = body.mass + tow.weight / GRAVITY
     drag = max(tow.friction_wet if wet else tow.friction_dry for wet in grounds(scene))
     drag *= tow.weight * math.cos(slope)
-    return mass * gait.peak_acceleration, drag, mass * GRAVITY * abs(math.sin(slope))
+    if isinstance(body, RailBody):
+        drag += body.rolling_drag
+    return mass * scene.gait.peak_acceleration, drag, mass * GRAVITY * abs(math.sin(slope))
 
 
 def mid_stance_grip(scene: Scene, dome: bool, wet: bool) -> float:
     """Return the tangential resistance of a foot in mid-stance over its load."""
     stand = Stand(scene, dome)
-    films = stand.films(0.5 * stance(scene)) if wet else (0.0, 0.0)
+    films = stand.films(0.5 * scene.gait.stance) if wet else (0.0, 0.0)
     return stand.resistance(*films) / scene.expected_load
-
-
-def stance(scene: Scene) -> float:
-    """Return how long a foot stands, s."""
-    gait = scene.gait
-    return gait.stance if isinstance(gait, RailGait) else gait.duty * gait.cycle
 
 
 class Stand:
@@ -158,24 +146,6 @@ class Stand:
             return 1, self.foot.sole_radius
         pads = self.foot.pads
         return pads, math.sqrt(self.on_domes / self.pressure / pads / math.pi)
-
-    def dimples(self, time: float) -> Iterator[tuple[str, float, float, float]]:
-        """Yield for domes and sole, if they carry load: name, and films after a time, s, in m.
-
-        These are the rigid film, and with a soft surface the dimple in its middle and its mean.
-        """
-        foot, (dome_film, sole_film) = self.foot, self.films(time)
-        if self.on_domes > 0.0:
-            contact = math.sqrt(self.on_domes / self.pressure / foot.pads / math.pi)
-            sphere = float(inflate(foot.pad, self.pressure).sphere_radius)
-            middle = dome_dimple(contact, sphere, self.pressure, time, self.floor.viscosity)
-            yield 'domes', dome_film, middle, 0.5 * middle
-        if self.on_sole > 0.0:
-            material = foot.pad.material
-            modulus = 4.0 * material.shear_modulus if material else SOLE_MODULUS
-            mean = trapped_film(foot.sole_radius, modulus, self.on_sole / foot.sole_area)
-            mean = min(mean, self.floor.film_thickness)
-            yield 'sole', sole_film, DIMPLE / TRAPPED * mean, mean
 
 
 def dome_pressure(scene: Scene) -> float:

@@ -12,7 +12,6 @@ from html import escape  # xml.sax would import all of urllib
 
 import numpy as np
 
-from ros_pad.configuration import choice, integer, number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
 from ros_pad.robots import Robot
@@ -47,11 +46,6 @@ class SolverSettings:
     noslip_iterations : int
         Iterations of the solver that removes the creep afterwards, 0 to 100; for elliptic cones
         only.
-
-    Raises
-    ------
-    InvalidInput
-        When a value is outside its range.
     """
 
     timestep: float = 2e-3
@@ -59,13 +53,6 @@ class SolverSettings:
     cone: str = 'elliptic'
     impratio: float = 100.0
     noslip_iterations: int = 0
-
-    def __post_init__(self) -> None:
-        number('timestep', self.timestep, 's', 1e-5, 0.01)
-        choice('integrator', self.integrator, ('Euler', 'implicit', 'implicitfast'))
-        choice('cone', self.cone, ('pyramidal', 'elliptic'))
-        number('impratio', self.impratio, '(ratio)', 1.0, 1e4)
-        integer('noslip_iterations', self.noslip_iterations, 0, 100)
 
 
 RECOMMENDED = SolverSettings()

@@ -18,22 +18,23 @@ from typing import Any
 import numpy as np
 
 from ros_pad.configuration import instance, integer, number
-from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import NoConvergence
 from ros_pad.records import Array
 from ros_pad.simulation import compiled, planar_step
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.planar_step import (
-    PlanarFloor,
-    PlanarFoot,
-    PlanarGait,
-    PlanarModel,
-    PlanarTow,
-    PlanarTrunk,
-)
+from ros_pad.simulation.planar_model import model_of
 from ros_pad.simulation.robot import FootState, Vector, check_pressures, check_reach
 from ros_pad.simulation.scene import LeggedBody, Scene
-from ros_pad.simulation.terrain import CELL, WIDTH, Floor
+from ros_pad.simulation.terrain import Floor
+
+# Rows of the table that become attributes of FootState; the first seven are the contacts.
+_SHOWN = (
+    planar_step.FORCE_X, planar_step.FORCE_Y, planar_step.LOAD,
+    planar_step.MOMENT,
+    planar_step.MARKER_X, planar_step.MARKER_Y, planar_step.HEIGHT,
+    planar_step.CAP, planar_step.WET,
+    planar_step.SLIP_SPEED, planar_step.SLIP_PATH, planar_step.OVERLOAD,
+)  # fmt: skip
 
 
 class PlanarRobot:
@@ -51,9 +52,6 @@ class PlanarRobot:
         Whether numba compiles the steps. None compiles them if that saves time: when numba is
         installed and the trial of the scene is long, or when steps were compiled before. Plain and
         compiled steps give the same walk to the last bit.
-    soles_turn : bool
-        Whether a sole turns with its leg about the hip, as on legs of three joints without an
-        ankle. Otherwise the sole turns with the body alone.
 
     Attributes
     ----------
@@ -80,13 +78,11 @@ class PlanarRobot:
     '0.70 m'
     """
 
+    joint_names: tuple[str, ...] = ()
+    joint_positions: tuple[float, ...] = ()
+
     def __init__(
-        self,
-        scene: Scene,
-        floor: Floor,
-        period: float,
-        compile_steps: bool | None = None,
-        soles_turn: bool = False,
+        self, scene: Scene, floor: Floor, period: float, compile_steps: bool | None = None
     ) -> None:
         instance('scene', scene, Scene)
         instance('scene.body', scene.body, LeggedBody)
@@ -101,11 +97,9 @@ class PlanarRobot:
         self.time = 0.0
         self.dissipation = 0.0
         self.verdict: str | None = None
-        self.joint_names: tuple[str, ...] = ()
-        self.joint_positions: tuple[float, ...] = ()
         self._feet = [FootState() for _ in self.legs]
         self._fresh = False
-        self.model = model_of(scene, floor, period, soles_turn)
+        self.model = model_of(scene, floor, period)
         self.state: Any = [0.0] * planar_step.BODY
         self.table: Any = [[0.0] * len(self.legs) for _ in range(planar_step.FEET)]
         self._plant()
@@ -116,17 +110,16 @@ class PlanarRobot:
 
     def _plant(self) -> None:
         """Place the feet as if the gait had been running before time zero."""
-        model, table = self.model, self.table
+        model, gait, table = self.model, self.model.gait, self.table
         for index in range(len(self.legs)):
-            phase = (model.gait.duty / 2.0 - model.gait.middle[index]) % 1.0
-            offset = model.gait.reach
-            if phase < model.gait.duty:
-                offset += planar_step.body_advance(model, -phase * model.gait.cycle)
+            phase = (gait.duty / 2.0 - gait.middles[index]) % 1.0
+            if phase < gait.duty:
+                offset = gait.reach + planar_step.body_advance(model, -phase * gait.cycle)
             else:
-                offset *= -math.cos(math.pi * (phase - model.gait.duty) / (1.0 - model.gait.duty))
+                offset = -gait.reach * math.cos(math.pi * (phase - gait.duty) / (1.0 - gait.duty))
             table[planar_step.PHASE][index] = phase
             table[planar_step.OFFSET_X][index] = table[planar_step.LIFTED_X][index] = offset
-            if phase < model.gait.duty:
+            if phase < gait.duty:
                 planar_step.touch_down(model, self.state, table, index)
 
     def _compile(self) -> None:
@@ -137,9 +130,7 @@ class PlanarRobot:
             foot=model.foot._replace(limits=np.array(model.foot.limits)),
             floor=floor._replace(wet=np.array(floor.wet), heights=np.array(floor.heights)),
         )
-        self._walk = compiled.walk(
-            self.model, self.state, self.table, (0.0,) * len(self.legs), 1, True
-        )
+        self._walk = compiled.walk(self.model, self.state, self.table, (0.0,) * len(self.legs), 1)
 
     @property
     def body(self) -> Vector:
@@ -162,7 +153,7 @@ class PlanarRobot:
         NoConvergence
             When the friction step does not converge.
         """
-        self._advance(pressures, 1, False)
+        self._advance(pressures, 1)
 
     def walk(self, pressures: Sequence[float], steps: int) -> int:
         """Make many steps with the same pressures.
@@ -192,14 +183,12 @@ class PlanarRobot:
         """
         integer('steps', steps)
         before = self.state[planar_step.STEPS]
-        self._advance(pressures, steps, True)
+        self._advance(pressures, steps)
         return round(self.state[planar_step.STEPS] - before)
 
-    def _advance(self, pressures: Sequence[float], steps: int, upright: bool) -> None:
+    def _advance(self, pressures: Sequence[float], steps: int) -> None:
         check_pressures(pressures, len(self.legs))
-        converged = self._walk(
-            self.model, self.state, self.table, tuple(pressures), steps, upright
-        )
+        converged = self._walk(self.model, self.state, self.table, tuple(pressures), steps)
         if not converged:
             raise NoConvergence(
                 f'friction step of {self.period:g} s does not converge: shorten the period, or'
@@ -242,112 +231,3 @@ class PlanarRobot:
             state.slip_speed, state.slip_path = speed, path
             state.overload_time = overload
         return self._feet
-
-
-# Rows of the table that become attributes of FootState; the first seven are the contacts.
-_SHOWN = (
-    planar_step.FORCE_X, planar_step.FORCE_Y, planar_step.LOAD,
-    planar_step.MOMENT,
-    planar_step.MARKER_X, planar_step.MARKER_Y, planar_step.HEIGHT,
-    planar_step.CAP, planar_step.WET,
-    planar_step.SLIP_SPEED, planar_step.SLIP_PATH, planar_step.OVERLOAD,
-)  # fmt: skip
-
-
-def model_of(scene: Scene, floor: Floor, period: float, soles_turn: bool = False) -> PlanarModel:
-    """Return the constants of a walk of a scene's robot on a floor."""
-    return PlanarModel(
-        period=period,
-        settle=scene.settle,
-        gait=_gait(scene, soles_turn),
-        trunk=_trunk(scene),
-        tow=_tow(scene),
-        foot=_foot(scene),
-        floor=_floor(floor),
-    )
-
-
-def _gait(scene: Scene, soles_turn: bool) -> PlanarGait:
-    gait = scene.gait
-    assert isinstance(gait, WalkingGait)
-    return PlanarGait(
-        cycle=gait.cycle,
-        stride=gait.stride,
-        duty=gait.duty,
-        lift=gait.lift,
-        reach=gait.reach(),
-        pushes=gait.pushes,
-        overlap=gait.overlap,
-        middle=gait.middles,
-        heading_gain=scene.heading_gain,
-        soles_turn=soles_turn,
-    )
-
-
-def _trunk(scene: Scene) -> PlanarTrunk:
-    body, gait, slope = scene.body, scene.gait, scene.floor.slope
-    assert isinstance(body, LeggedBody) and isinstance(gait, WalkingGait)
-    reach = max(x * x + y * y for x, y in body.homes)
-    hips = body.robot.hips.tolist()
-    return PlanarTrunk(
-        home_x=tuple(x for x, _ in body.homes),
-        home_y=tuple(y for _, y in body.homes),
-        hip_x=tuple(hip[0] for hip in hips),
-        hip_y=tuple(hip[1] for hip in hips),
-        centre_x=float(body.robot.centre[0]),
-        centre_y=float(body.robot.centre[1]),
-        mass=body.mass,
-        inertia=body.inertia,
-        height=body.height,
-        weight=body.mass * GRAVITY * math.cos(slope),
-        downhill=GRAVITY * math.sin(slope),
-        leg_stiffness=body.leg_stiffness,
-        rocks=0.0 if gait.fewest >= 3 and len(gait.middles) > 4 else 1e-9 * reach,
-    )
-
-
-def _tow(scene: Scene) -> PlanarTow:
-    tow, across = scene.tow, math.cos(scene.floor.slope)
-    return PlanarTow(
-        mass=tow.weight / GRAVITY,
-        dry=tow.weight * tow.friction_dry * across,
-        wet=tow.weight * tow.friction_wet * across,
-        distance=tow.distance,
-        height=tow.height,
-        stiffness=tow.stiffness,
-    )
-
-
-def _foot(scene: Scene) -> PlanarFoot:
-    viscosity, foot = scene.floor.viscosity, scene.foot.on_rough(scene.floor.roughness)
-    return PlanarFoot(
-        friction=foot.friction,
-        shear_strength=foot.shear_strength,
-        conforming_pressure=foot.conforming_pressure,
-        boundary_friction=foot.boundary_friction,
-        capillary=foot.pads * foot.capillary_force,
-        critical_film=foot.critical_film,
-        film_exponent=foot.film_exponent,
-        shear_stiffness=foot.shear_stiffness,
-        turning_radius=foot.turning_radius,
-        sole_area=foot.sole_area,
-        dome_drain=4.0 * math.pi * foot.pads / (3.0 * viscosity),
-        sole_drain=4.0 / (3.0 * viscosity * foot.sole_radius**2),
-        limit_cell=foot._limit_cell,
-        limits=foot._limit_table,
-    )
-
-
-def _floor(floor: Floor) -> PlanarFloor:
-    heights = floor.heights
-    return PlanarFloor(
-        puddle=floor.film_thickness**-2 if floor.film_thickness > 0.0 else math.inf,
-        wet=floor.wet_map.tolist(),
-        wet_cell=floor.cell,
-        wet_x=floor.origin[0],
-        wet_y=floor.origin[1],
-        heights=[[0.0]] if heights is None else heights.tolist(),
-        height_cell=CELL,
-        height_x=-1.0,
-        height_y=-WIDTH / 2.0,
-    )

@@ -16,36 +16,40 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, exp, inf, pi, sin, sqrt
-from typing import Any, NamedTuple
+from typing import Any
+
+from ros_pad.simulation.planar_model import PlanarModel
 
 # A contact in a step: lever arm x, y, m; velocity x, y, m/s, and yaw rate, rad/s, at which the
 # contact would slide if the body stood still; turning radius, m; cap of its force, N; force over
 # velocity up to the cap, N s/m.
 Pushed = tuple[float, float, float, float, float, float, float, float]
 
+Floats = Sequence[float]
+Three = tuple[float, float, float]
+Leg = tuple[int, float, float, float, float]  # index, share, x, y, preload
+
 # Rows of the table of feet; a column is a foot. Values are in world axes unless noted.
-FEET = 28
+FEET = 27
 (
     PHASE,  # time since touch-down, as a share of the cycle
     OFFSET_X, OFFSET_Y,  # from home, in the body, m
     LIFTED_X, LIFTED_Y,  # place of the lift-off, from home, in the body, m
-    GROUND,  # height of the ground below the foot, m
-    HEIGHT,  # height of the foot above the ground, m
+    GROUND, HEIGHT,  # height of the ground below the foot, and of the foot above it, m
     FRESH, DOME_FILM, SOLE_FILM,  # 1/h² of the film at touch-down, under domes, under sole, 1/m²
     DOME_AREA,  # contact area of the domes, m²
     LOAD, CAP,  # load and tangential capacity, N
     SHEAR_X, SHEAR_Y, SHEAR_TURN,  # shear of the pads, m and rad
     FORCE_X, FORCE_Y, MOMENT,  # force of the ground on the foot, N, and yaw moment, N m
-    SLIP_SPEED,  # m/s
-    SLIP_PATH,  # m
+    SLIP_SPEED, SLIP_PATH,  # m/s, m
     OVERLOAD,  # time with a load above the force limit of the domes, s
     WET,  # 1 on wet ground, 0 on dry
     MARKER_X, MARKER_Y,  # position of the marker, m
-    STEP_X, STEP_Y, STEP_TURN,  # motion of the foot in the body in this step, m and rad
+    STEP_X, STEP_Y,  # motion of the foot in the body in this step, m
 ) = range(FEET)  # fmt: skip
 
 # Entries of the body, in SI units.
-BODY = 17
+BODY = 16
 (
     STEPS, X, Y, HEADING, SPEED_X, SPEED_Y, YAW_RATE,
     PULL_X, PULL_Y,  # force of the towed load on the body, N
@@ -53,108 +57,16 @@ BODY = 17
     LOST,  # work lost in slip, J
     TIPPED, TIPPED_AT,  # foot that would have to pull, one more than feet: no balance; time, s
     PUSH_X, PUSH_Y,  # force of all feet, N
-    SLED_CAP,  # friction of the towed load, N
 ) = range(BODY)  # fmt: skip
 
 
-class PlanarGait(NamedTuple):
-    """The gait, and how it moves feet and soles."""
-
-    cycle: float
-    stride: float
-    duty: float
-    lift: float
-    reach: float
-    pushes: bool  # whether the body's speed is zero twice a cycle
-    overlap: float  # share of the cycle in which load passes from foot to foot
-    middle: tuple[float, ...]  # time of the middle of each leg's push, as a share of the cycle
-    heading_gain: float
-    soles_turn: bool
-
-
-class PlanarTrunk(NamedTuple):
-    """Body and legs."""
-
-    home_x: tuple[float, ...]
-    home_y: tuple[float, ...]
-    hip_x: tuple[float, ...]
-    hip_y: tuple[float, ...]
-    centre_x: float  # of mass, in the body, m
-    centre_y: float
-    mass: float
-    inertia: float
-    height: float
-    weight: float  # component of the weight normal to the floor, N
-    downhill: float  # acceleration along -x, m/s²
-    leg_stiffness: float
-    rocks: float  # m²: lets feet in a line carry the body; 0 if it must be in balance
-
-
-class PlanarTow(NamedTuple):
-    """The towed load."""
-
-    mass: float  # mass, kg
-    dry: float  # drag of the towed load on dry ground, N
-    wet: float  # drag of the towed load on wet ground, N
-    distance: float
-    height: float
-    stiffness: float
-
-
-class PlanarFoot(NamedTuple):
-    """Friction and film of a foot on the floor of the scene."""
-
-    friction: float
-    shear_strength: float
-    conforming_pressure: float
-    boundary_friction: float
-    capillary: float  # tangential force of the liquid around all domes, N
-    critical_film: float
-    film_exponent: float
-    shear_stiffness: float
-    turning_radius: float
-    sole_area: float
-    dome_drain: float
-    sole_drain: float
-    limit_cell: float
-    limits: Any  # sequence of force limits, N, every limit_cell from 0 Pa
-
-
-class PlanarFloor(NamedTuple):
-    """Maps of liquid and heights."""
-
-    puddle: float  # 1/h² of standing liquid, 1/m²
-    wet: Any  # [row along y][column along x], True where wet
-    wet_cell: float
-    wet_x: float
-    wet_y: float
-    heights: Any  # [row along y][column along x], m
-    height_cell: float
-    height_x: float
-    height_y: float
-
-
-class PlanarModel(NamedTuple):
-    """Constants of a walk in SI units, in tuples and sequences, because numba takes no objects."""
-
-    period: float
-    settle: float
-    gait: PlanarGait
-    trunk: PlanarTrunk
-    tow: PlanarTow
-    foot: PlanarFoot
-    floor: PlanarFloor
-
-
-def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -> bool:
+def step(model: PlanarModel, body: Any, feet: Any, pressures: Floats) -> bool:
     """Advance by a period; return False if the friction step did not converge."""
     dt = model.period
-    before = body[STEPS] * dt - model.settle
-    body[STEPS] += 1.0
     # The gait has its own clock, which starts when the robot has settled.
-    time = body[STEPS] * dt - model.settle
-    before = before if before > 0.0 else 0.0
-    time = time if time > 0.0 else 0.0
+    before = max(0.0, body[STEPS] * dt - model.settle)
+    body[STEPS] += 1.0
+    time = max(0.0, body[STEPS] * dt - model.settle)
     move_feet(model, body, feet, before, time)
     share_loads(model, body, feet)
     # Lever arms and motions are turned into world axes with the heading in mid-step.
@@ -167,17 +79,16 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
         behind_x = body[X] - model.tow.distance * cosine
         behind_y = body[Y] - model.tow.distance * sine
         cap = model.tow.wet if is_wet(model, behind_x, behind_y) else model.tow.dry
-    body[SLED_CAP] = cap
     stiffness = model.tow.stiffness
     if cap > 0.0:
         contacts.append((
             0.0, 0.0, body[SLED_X] / dt, body[SLED_Y] / dt, 0.0, 0.0, cap, stiffness * dt
         ))  # fmt: skip
-    mass = model.trunk.mass + towed
     last_x, last_y = body[SPEED_X], body[SPEED_Y]
     free_x = last_x - model.trunk.downhill * dt
     vx, vy, yaw_rate, converged = newton(
-        (free_x, last_y, body[YAW_RATE]), mass, model.trunk.inertia, contacts, dt,
+        (free_x, last_y, body[YAW_RATE]),
+        model.trunk.mass + towed, model.trunk.inertia, contacts, dt,
         (last_x, last_y, body[YAW_RATE]), 0.0,
     )  # fmt: skip
     if not converged:
@@ -193,22 +104,20 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -
     body[X] += vx * dt
     body[Y] += vy * dt
     body[HEADING] += yaw_rate * dt
-    report(model, body, feet, pressures, contacts)
+    report(model, body, feet, contacts)
     return True
 
 
-def walk(
-    model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float], count: int, upright: bool
-) -> bool:
+def walk(model: PlanarModel, body: Any, feet: Any, pressures: Floats, count: int) -> bool:
     """Make ``count`` steps with the same gauge pressures, Pa, or fewer if the walk ends.
 
-    The walk ends at a step that does not converge, and then the result is False. With ``upright``
-    it also ends after the step in which the robot tips over.
+    The walk ends at a step that does not converge, and then the result is False. It also ends
+    after the step in which the robot tips over.
     """
     for _ in range(count):
         if not step(model, body, feet, pressures):
             return False
-        if upright and body[TIPPED] > 0.0:
+        if body[TIPPED] > 0.0:
             break
     return True
 
@@ -226,8 +135,8 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
     lifted_x, lifted_y = feet[LIFTED_X], feet[LIFTED_Y]
     heights, step_x, step_y = feet[HEIGHT], feet[STEP_X], feet[STEP_Y]
     share = time / cycle
-    for index in range(len(gait.middle)):
-        phase = (share - gait.middle[index] + duty / 2.0) % 1.0
+    for index in range(len(gait.middles)):
+        phase = (share - gait.middles[index] + duty / 2.0) % 1.0
         x, y = offset_x[index], offset_y[index]
         stood = phases[index] < duty
         phases[index] = phase
@@ -240,12 +149,6 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
             step_y[index] = -turn * (trunk.home_x[index] + x)
             offset_x[index] = x + step_x[index]
             offset_y[index] = y + step_y[index]
-            if gait.soles_turn:
-                # The sole turns with its leg, by the angle of the foot's motion seen from the hip.
-                arm_x = trunk.home_x[index] - trunk.hip_x[index] + x + 0.5 * step_x[index]
-                arm_y = trunk.home_y[index] - trunk.hip_y[index] + y + 0.5 * step_y[index]
-                across = arm_x * step_y[index] - arm_y * step_x[index]
-                feet[STEP_TURN][index] = across / (arm_x * arm_x + arm_y * arm_y)
         else:
             if stood:
                 lifted_x[index], lifted_y[index] = x, y
@@ -319,7 +222,6 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     A gait in which only two feet stand, such as a trot, is in balance on average only. There
     ``rocks`` lets the line between them carry the weight, without the moment about that line.
     """
-    duty = model.gait.duty
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     lift = model.tow.height - model.trunk.height
     lean_x = lift * body[PULL_X] - model.trunk.height * body[PUSH_X]
@@ -332,14 +234,14 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     phases, offset_x, offset_y, ground = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y], feet[GROUND]
     loads = feet[LOAD]
     legs = []
-    for index in range(len(model.gait.middle)):
+    for index in range(len(model.gait.middles)):
         loads[index] = 0.0
-        share = load_share(duty, model.gait.overlap, phases[index])
+        share = load_share(model.gait.duty, model.gait.overlap, phases[index])
         if share > 0.0:
             x = model.trunk.home_x[index] + offset_x[index]
             y = model.trunk.home_y[index] + offset_y[index]
             legs.append((index, share, x, y, model.trunk.leg_stiffness * ground[index]))
-    count = len(model.gait.middle)
+    count = len(model.gait.middles)
     sets = 1 << count
     presses = sets - 1  # set of feet that press, with a bit for each foot
     pulling = 0
@@ -360,13 +262,7 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
         body[TIPPED_AT] = body[STEPS] * model.period
 
 
-def balance(
-    legs: Sequence[tuple[int, float, float, float, float]],
-    presses: int,
-    wanted: tuple[float, float, float],
-    rocks: float,
-    loads: Any,
-) -> int:
+def balance(legs: Sequence[Leg], presses: int, wanted: Three, rocks: float, loads: Any) -> int:
     """Set the loads with which the feet in the set ``presses`` balance the robot, 0 for others.
 
     Returns
@@ -420,12 +316,7 @@ def balance(
 
 
 def grip(
-    model: PlanarModel,
-    body: Any,
-    feet: Any,
-    pressures: Sequence[float],
-    cosine: float,
-    sine: float,
+    model: PlanarModel, body: Any, feet: Any, pressures: Floats, cosine: float, sine: float
 ) -> list[Pushed]:
     """Set the tangential capacity of each foot, N; return the contacts of feet that have one.
 
@@ -434,7 +325,7 @@ def grip(
     dt = model.period
     stiffness, radius = model.foot.shear_stiffness, model.foot.turning_radius
     contacts = []
-    for index in range(len(model.gait.middle)):
+    for index in range(len(model.gait.middles)):
         load = feet[LOAD][index]
         if load <= 0.0:
             feet[CAP][index] = 0.0
@@ -460,7 +351,7 @@ def grip(
                 x, y,
                 (cosine * step_x - sine * step_y + feet[SHEAR_X][index]) / dt,
                 (sine * step_x + cosine * step_y + feet[SHEAR_Y][index]) / dt,
-                (feet[STEP_TURN][index] + feet[SHEAR_TURN][index]) / dt,
+                feet[SHEAR_TURN][index] / dt,
                 radius, cap, stiffness * dt,
             ))  # fmt: skip
     return contacts
@@ -471,8 +362,7 @@ def dome_load(model: PlanarModel, load: float, pressure: float) -> float:
     if pressure <= 0.0:
         return 0.0
     place = pressure / model.foot.limit_cell
-    table = model.foot.limits
-    last = len(table) - 1
+    table, last = model.foot.limits, len(model.foot.limits) - 1
     if place >= last:
         limit = table[last]
     else:
@@ -485,7 +375,6 @@ def drain(
     model: PlanarModel, feet: Any, index: int, on_domes: float, on_sole: float, pressure: float
 ) -> None:
     """Drain the film under a foot for a period."""
-    dt = model.period
     if on_domes > 0.0:
         area = on_domes / pressure
         fresh = feet[FRESH][index]
@@ -494,11 +383,13 @@ def drain(
             old = feet[DOME_AREA][index] / area
             feet[DOME_FILM][index] = fresh + old * (feet[DOME_FILM][index] - fresh)
         feet[DOME_AREA][index] = area
-        feet[DOME_FILM][index] += model.foot.dome_drain * pressure / area * dt
+        feet[DOME_FILM][index] += model.foot.dome_drain * pressure / area * model.period
     else:
         feet[DOME_AREA][index] = 0.0
     if on_sole > 0.0:
-        feet[SOLE_FILM][index] += model.foot.sole_drain * on_sole / model.foot.sole_area * dt
+        feet[SOLE_FILM][index] += (
+            model.foot.sole_drain * on_sole / model.foot.sole_area * model.period
+        )
 
 
 def resistance(
@@ -511,8 +402,7 @@ def resistance(
 ) -> float:
     """Return the tangential capacity of a foot, N."""
     total = under_domes = 0.0
-    foot = model.foot
-    conforming = foot.conforming_pressure
+    foot, conforming = model.foot, model.foot.conforming_pressure
     if on_domes > 0.0:
         under_domes = on_domes / (pressure if pressure > conforming else conforming)
         dry = foot.friction * on_domes + foot.shear_strength * under_domes
@@ -536,12 +426,12 @@ def on_film(model: PlanarModel, dry: float, load: float, film: float) -> float:
 
 
 def newton(
-    free: tuple[float, float, float],
+    free: Three,
     mass: float,
     inertia: float,
     contacts: Sequence[Pushed],
     dt: float,
-    start: tuple[float, float, float],
+    start: Three,
     creep: float,
 ) -> tuple[float, float, float, bool]:
     """Minimise the convex energy of a step by Newton's method, with a line search by halving.
@@ -596,8 +486,8 @@ def newton(
 
 
 def derivatives(
-    velocity: tuple[float, float, float],
-    free: tuple[float, float, float],
+    velocity: Three,
+    free: Three,
     mass: float,
     inertia: float,
     contacts: Sequence[Pushed],
@@ -665,24 +555,22 @@ def push(
     return -gain * zx, -gain * zy, -gain * radius * zt, loose * sqrt(along), loose * size * cap
 
 
-def report(
-    model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float], contacts: list[Pushed]
-) -> None:
+def report(model: PlanarModel, body: Any, feet: Any, contacts: list[Pushed]) -> None:
     """Set forces, shear, slip and markers of the feet, and add the work lost in slip."""
     dt = model.period
     stiffness, radius = model.foot.shear_stiffness, model.foot.turning_radius
     torsional = stiffness * radius * radius
     vx, vy, yaw_rate = body[SPEED_X], body[SPEED_Y], body[YAW_RATE]
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
-    total_x = total_y = 0.0
+    body[PUSH_X] = body[PUSH_Y] = 0.0
     place = 0
-    for index in range(len(model.gait.middle)):
+    for index in range(len(model.gait.middles)):
         fx = fy = moment = slid = 0.0
         if feet[CAP][index] > 0.0:
             fx, fy, moment, slid, lost = push(vx, vy, yaw_rate, contacts[place], dt)
             place += 1
-            total_x += fx
-            total_y += fy
+            body[PUSH_X] += fx
+            body[PUSH_Y] += fy
             body[LOST] += lost
             feet[SLIP_PATH][index] += slid
         feet[FORCE_X][index], feet[FORCE_Y][index], feet[MOMENT][index] = fx, fy, moment
@@ -693,7 +581,6 @@ def report(
         home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
         feet[MARKER_X][index] = body[X] + cosine * home_x - sine * home_y
         feet[MARKER_Y][index] = body[Y] + sine * home_x + cosine * home_y
-    body[PUSH_X], body[PUSH_Y] = total_x, total_y
 
 
 # Functions that `walk` calls; the compiler needs a list of them.

@@ -10,7 +10,8 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 from ros_pad.configuration import instance, number
@@ -46,8 +47,8 @@ class RegulatorModel:
     """An electro-pneumatic regulator, modelled by the pressure at its outlet.
 
     A set-point is rounded to the quantum, ignored when it is within the dead band of the last
-    accepted one (except zero, which opens the exhaust), delayed by the dead time, limited in slew,
-    and followed as a second-order system. The outlet stays between zero and full scale.
+    accepted one (except zero, which opens the exhaust), delayed by the dead time, and followed as
+    a second-order system. The outlet stays between zero and full scale.
 
     Parameters
     ----------
@@ -63,8 +64,6 @@ class RegulatorModel:
         Highest outlet pressure, Pa, 1e3 to 1e6.
     quantum : float
         Resolution of the set-point, Pa, 0 (none) to 1e4.
-    slew_limit : float
-        Largest rate of change, Pa/s, from 1e3; infinite for no limit.
 
     Raises
     ------
@@ -78,7 +77,6 @@ class RegulatorModel:
     dead_band: float = 0.005
     full_scale: float = 100e3
     quantum: float = 100.0
-    slew_limit: float = math.inf
 
     def __post_init__(self) -> None:
         number('natural_frequency', self.natural_frequency, 'rad/s', 1.0, 1000.0)
@@ -87,8 +85,6 @@ class RegulatorModel:
         number('dead_band', self.dead_band, 'of full scale', 0.0, 0.1)
         number('full_scale', self.full_scale, 'Pa', 1e3, 1e6)
         number('quantum', self.quantum, 'Pa', 0.0, 1e4)
-        if self.slew_limit != math.inf:
-            number('slew_limit', self.slew_limit, 'Pa/s', 1e3)
 
     def transition(self, time: float) -> tuple[float, float, float, float]:
         """Return the exact transition matrix of (error, error rate) over a time.
@@ -160,8 +156,6 @@ class Hose:
         C of the whole line, m³/(s Pa), in place of the formula: for instance when a fitting or the
         regulator's valve is narrower than the hose. All of the hose is then behind the resistance.
         1e-8 m³/(s Pa) = 1 dm³/(s bar).
-    measured_critical_ratio : float, optional
-        Critical ratio b of the whole line, 0 to 0.9, in place of the formula.
 
     Raises
     ------
@@ -184,18 +178,21 @@ class Hose:
     inner_diameter: float
     length: float
     measured_conductance: float | None = None
-    measured_critical_ratio: float | None = None
-    _law: tuple[float, float, float] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         number('hose_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
         number('hose_length', self.length, 'm', 0.0, 50.0)
         if self.measured_conductance is not None:
             number('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
-        if self.measured_critical_ratio is not None:
-            number('hose_critical_ratio', self.measured_critical_ratio, '(ratio)', 0.0, 0.9)
-        law = self.sonic_conductance, self.critical_ratio, self._laminar
-        object.__setattr__(self, '_law', law)  # every step needs it
+
+    @cached_property
+    def _law(self) -> tuple[float, float, float]:
+        """What every step needs, last the laminar flow over the difference of p², kg/(s Pa²)."""
+        slope, rt = math.inf, REFERENCE_PRESSURE / REFERENCE_DENSITY
+        if self.length:
+            drag = 256.0 * AIR_VISCOSITY * self.length * rt
+            slope = math.pi * self.inner_diameter**4 / drag
+        return self.sonic_conductance, self.critical_ratio, slope
 
     @property
     def volume(self) -> float:
@@ -218,17 +215,7 @@ class Hose:
     @property
     def critical_ratio(self) -> float:
         """b, the ratio of absolute pressures, downstream over upstream, where choking begins."""
-        if self.measured_critical_ratio is not None:
-            return self.measured_critical_ratio
         return 474.0 * self.sonic_conductance / self.inner_diameter**2
-
-    @property
-    def _laminar(self) -> float:
-        """Laminar mass flow over the difference of squared pressures, kg/(s Pa²)."""
-        if not self.length:
-            return math.inf
-        rt = REFERENCE_PRESSURE / REFERENCE_DENSITY
-        return math.pi * self.inner_diameter**4 / (256.0 * AIR_VISCOSITY * self.length * rt)
 
     def conductance(self, first: float, second: float) -> float:
         """Return mass flow over pressure difference between two absolute pressures.
@@ -275,7 +262,6 @@ class Outlet:
         self.pending: tuple[tuple[float, float], ...] = ()
         self._rate = 0.0
         self._accepted = 0.0  # the set-point that the dead band compares with
-        self._reference = 0.0  # the target after the slew limit, Pa
         self._transition = (0.0, model.transition(0.0))
 
     def command(self, setpoint: float, time: float) -> bool:
@@ -295,36 +281,21 @@ class Outlet:
             self.pending = (*self.pending, (time + model.dead_time, target))
         return follows
 
-    def slope(self, h: float) -> tuple[float, float]:
-        """Return how fast the reference rises, Pa/s, and for how long at most, s, at least h."""
-        away = self.target - self._reference
-        if not away:
-            return 0.0, h
-        limit = self.model.slew_limit
-        if abs(away) <= limit * _INSTANT:
-            self._reference = self.target
-            return 0.0, h
-        return math.copysign(limit, away), min(h, abs(away) / limit)
-
-    def move(self, h: float, slope: float, hardware: Condition) -> None:
+    def move(self, h: float, hardware: Condition) -> None:
         """Move by the exact response of the regulator over a time h, s, within its limits."""
         model = self.model
         if h != self._transition[0]:
             self._transition = h, model.transition(h)
         ff, fr, rf, rr = self._transition[1]
-        # The regulator controls the reading of its sensor, except with an open exhaust.
-        aim = self._reference - hardware.offset if self._reference else 0.0
-        # A second-order system follows a ramp with a constant lag; the rest of its motion decays.
-        lag = 2.0 * model.damping * slope / model.natural_frequency
-        error = self.pressure - aim + lag
-        rate = self._rate - slope
-        self._reference += slope * h
         if hardware.stuck:
             outlet, self._rate = self.pressure, 0.0
         else:
-            outlet = aim + slope * h - lag + ff * error + fr * rate
-            self._rate = slope + rf * error + rr * rate
-        highest = model.full_scale if hardware is SOUND else min(model.full_scale, hardware.supply)
+            # The regulator controls the reading of its sensor, except with an open exhaust.
+            aim = self.target - hardware.offset if self.target else 0.0
+            error = self.pressure - aim
+            outlet = aim + ff * error + fr * self._rate
+            self._rate = rf * error + rr * self._rate
+        highest = min(model.full_scale, hardware.supply)
         if not 0.0 <= outlet <= highest:
             # Neither the exhaust nor the supply can move the outlet pressure further.
             outlet = 0.0 if outlet < 0.0 else highest
@@ -339,7 +310,6 @@ class Outlet:
         settled = (
             abs(self.pressure - self.target) < _SETTLED
             and abs(self._rate) < _SETTLED * self.model.natural_frequency
-            and self._reference == self.target
             and not self.pending
         )
         if settled:
@@ -356,8 +326,8 @@ class PadAir:
         As for :class:`PneumaticChannel`.
     hose : Hose
         The hose behind the regulator.
-    ambient, full_scale : float
-        Ambient pressure, absolute Pa, and highest pressure, gauge Pa.
+    full_scale : float
+        Highest pressure, gauge Pa.
 
     Attributes
     ----------
@@ -369,23 +339,18 @@ class PadAir:
         self,
         pad_volume: float | Callable[[float], float],
         hose: Hose,
-        ambient: float,
         full_scale: float,
     ) -> None:
-        if callable(pad_volume):
-            self._cell = full_scale / _CELLS
-            pressures = [i * self._cell for i in range(_CELLS + 1)]
-            volumes = [pad_volume(pressure) for pressure in pressures]
-        else:
-            self._cell = full_scale
-            pressures = [0.0, self._cell]
-            volumes = [pad_volume, pad_volume]
+        count = _CELLS if callable(pad_volume) else 1
+        self._cell = full_scale / count
+        pressures = [i * self._cell for i in range(count + 1)]
+        volumes = [pad_volume(p) if callable(pad_volume) else pad_volume for p in pressures]
         for pressure, volume in zip(pressures, volumes, strict=True):
             number(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
         self.before = hose.volume - hose.volume_behind
         # Content p V in Pa m³, and its slope, the capacity, in m³.
         contents = [
-            (p + ambient) * (float(v) + hose.volume_behind)
+            (p + ATMOSPHERE) * (float(v) + hose.volume_behind)
             for p, v in zip(pressures, volumes, strict=True)
         ]
         capacities = [(high - low) / self._cell for low, high in pairwise(contents)]
@@ -424,8 +389,6 @@ class PneumaticChannel:
     pad_volume : float or callable
         Air volume of all pads of the foot and their chamber, m³, 1e-9 to 1e-2: a constant, or a
         function of gauge pressure in Pa. A function is tabulated once, from 0 to full scale.
-    ambient : float
-        Ambient pressure, absolute Pa, 1e3 to 2e5.
     faults : sequence of Fault
         Faults of this channel, see :mod:`ros_pad.simulation.faults`.
 
@@ -475,23 +438,20 @@ class PneumaticChannel:
         regulator: RegulatorModel,
         hose: Hose,
         pad_volume: float | Callable[[float], float],
-        ambient: float = ATMOSPHERE,
         faults: Sequence[Fault] = (),
     ) -> None:
         instance('regulator', regulator, RegulatorModel)
         instance('hose', hose, Hose)
-        number('ambient', ambient, 'Pa (absolute)', 1e3, 2e5)
         self.hose = hose
         self.pad_pressure = 0.0
         self.settled = not faults  # a fault may act from the beginning
-        self._ambient = ambient
         self._faults = tuple(faults)
         self._edges = sorted({each.start for each in faults} | {each.end for each in faults})
         self._time = 0.0
         self._origin = 0.0  # time on the schedule of faults at which this channel started, s
         self.outlet = Outlet(regulator)
-        self._air = PadAir(pad_volume, hose, ambient, regulator.full_scale)
-        self._content = self._air.content(0.0) + self._air.before * ambient
+        self._air = PadAir(pad_volume, hose, regulator.full_scale)
+        self._content = self._air.content(0.0) + self._air.before * ATMOSPHERE
         self._drawn = 0.0
 
     def __copy__(self) -> PneumaticChannel:
@@ -505,11 +465,6 @@ class PneumaticChannel:
     def regulator(self) -> RegulatorModel:
         """The regulator."""
         return self.outlet.model
-
-    @property
-    def outlet_pressure(self) -> float:
-        """Pressure at the outlet of the regulator, gauge Pa, in [0, full scale]."""
-        return self.outlet.pressure
 
     @property
     def setpoint(self) -> float:
@@ -583,27 +538,22 @@ class PneumaticChannel:
                     outlet.target, outlet.pending = target, outlet.pending[1:]
                     continue
                 h = min(h, due - self._time)
-            slope, h = outlet.slope(h)
-            self._advance(h, slope)
+            self._advance(h)
             dt -= h
         return self.pad_pressure
 
-    def _advance(self, h: float, slope: float) -> None:
-        """Move regulator and pad by a time h, s, with a reference that rises at a slope, Pa/s."""
-        outlet, hardware = self.outlet, SOUND
-        if self._faults:
-            # Steps end where a fault starts or ends: one at mid-step acts during the whole step.
-            now = self.time
-            hardware = self._hardware(now + 0.5 * h, now + h)
+    def _advance(self, h: float) -> None:
+        """Move regulator and pad by a time h, s."""
+        outlet, now = self.outlet, self.time
+        # Steps end where a fault starts or ends: one at mid-step acts during the whole step.
+        hardware = self._hardware(now + 0.5 * h, now + h)
         start = outlet.pressure
-        outlet.move(h, slope, hardware)
+        outlet.move(h, hardware)
         self._move_pad(h, start, hardware.leak)
         self._time += h
-        if (
-            abs(self.pad_pressure - outlet.target) < _SETTLED
-            and (not self._faults or self._sound_for_now())
-            and outlet.settle()
-        ):
+        near = abs(self.pad_pressure - outlet.target) < _SETTLED
+        soon = self.time + 2.0 * _INSTANT  # within the rounding of the clock
+        if near and self._hardware(soon, soon).sound and outlet.settle():
             self._fill(outlet.target)
             self.settled = True
 
@@ -615,38 +565,35 @@ class PneumaticChannel:
         gap' = -relaxation gap - ramp.
         """
         outlet, before = self.outlet.pressure, self.pad_pressure
-        relaxation, share = self._relaxation(start, before, leak)
-        gap = before - share * start
-        ramp = share * (outlet - start) / h
-        done = -math.expm1(-0.5 * relaxation * h)
         middle = 0.5 * (start + outlet)
-        pad = share * middle + gap - (gap + ramp / relaxation) * done
-        relaxation, share = self._relaxation(middle, pad, leak)
-        gap = before - share * start
-        ramp = share * (outlet - start) / h
-        done = -math.expm1(-relaxation * h)
+        drawn, at, pad = start, before, before
+        for time, target in ((0.5 * h, middle), (h, outlet)):
+            at = pad
+            relaxation, share = self._relaxation(drawn, at, leak)
+            gap = before - share * start
+            ramp = share * (outlet - start) / h
+            done = -math.expm1(-relaxation * time)
+            pad = share * target + gap - (gap + ramp / relaxation) * done
+            drawn = middle
         lost = 0.0
         if leak:
-            lost = self._leaking(pad, leak) * pad * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
-        self._fill(share * outlet + gap - (gap + ramp / relaxation) * done, lost)
+            lost = self._leaking(at, leak) * at * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
+        self._fill(pad, lost)
 
     def _hardware(self, during: float, time: float) -> Condition:
         """Return the condition at a time, s, by the faults that act at the time ``during``, s."""
+        if not self._faults:
+            return SOUND
         acting = [each for each in self._faults if each.acts_at(during)]
         return condition(acting, time, self.regulator.full_scale)
-
-    def _sound_for_now(self) -> bool:
-        """Return whether no fault acts on the air, now or within the rounding of the clock."""
-        soon = self.time + 2.0 * _INSTANT
-        return self._hardware(soon, soon).sound
 
     def _relaxation(self, outlet: float, pad: float, leak: float) -> tuple[float, float]:
         """Return the rate, 1/s, at which the pad approaches a share of the outlet's pressure.
 
         Return this share, too.
         """
-        air, ambient = self._air, self._ambient
-        inflow = self.hose.conductance(outlet + ambient, pad + ambient)
+        air = self._air
+        inflow = self.hose.conductance(outlet + ATMOSPHERE, pad + ATMOSPHERE)
         if not leak:
             return inflow * air.stiffness(pad), 1.0
         total = inflow + self._leaking(pad, leak)
@@ -654,12 +601,12 @@ class PneumaticChannel:
 
     def _leaking(self, pad: float, leak: float) -> float:
         """Return the conductance of a leak at the pad, kg/(s Pa)."""
-        return conductance(leak, LEAK_CRITICAL_RATIO, pad + self._ambient, self._ambient)
+        return conductance(leak, LEAK_CRITICAL_RATIO, pad + ATMOSPHERE, ATMOSPHERE)
 
     def _fill(self, pressure: float, lost: float = 0.0) -> None:
         """Set the pad's pressure, Pa, and add the air drawn; ``lost`` is the air leaked, Pa m³."""
         content = self._air.content(pressure)
-        content += self._air.before * (self.outlet.pressure + self._ambient)
+        content += self._air.before * (self.outlet.pressure + ATMOSPHERE)
         if content + lost > self._content:
             self._drawn += content + lost - self._content
         self._content = content

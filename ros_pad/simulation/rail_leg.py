@@ -44,31 +44,28 @@ class RailLeg:
         When the period is not finite and above 0, or the scene has another robot.
     """
 
+    legs: tuple[int, ...] = (1,)
+    joint_names: tuple[str, ...] = ()
+    joint_positions: tuple[float, ...] = ()
+    verdict: str | None = None
+
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
         instance('scene', scene, Scene)
         instance('scene.body', scene.body, RailBody)
         instance('floor', floor, Floor)
         assert isinstance(scene.body, RailBody) and isinstance(scene.gait, RailGait)
         number('period', period, 's', above=True)
-        self.legs: tuple[int, ...] = (1,)
         self.period = period
         self.time = 0.0
         self.feet = [FootState()]
         self.dissipation = 0.0
-        self.verdict: str | None = None
-        self.joint_names: tuple[str, ...] = ()
-        self.joint_positions: tuple[float, ...] = ()
-        self._body = scene.body
-        self._gait = scene.gait
-        self._foot = scene.foot.on_rough(scene.floor.roughness)
+        self._scene = scene
         self._floor = floor
+        self._foot = scene.foot.on_rough(scene.floor.roughness)
         self._film = Film(self._foot, scene.floor.viscosity)
-        self._downhill = GRAVITY * math.sin(scene.floor.slope)
-        self._start = scene.settle
-        self._steps = 0
         self._x = self.speed = 0.0
         self._offset = scene.gait.stroke / 2.0
-        self._stands = True
+        self.feet[0].standing = True
         self._film.touch_down(floor.depth(self._offset, 0.0))
 
     @property
@@ -89,8 +86,9 @@ class RailLeg:
         tuple
             Whether the foot stands, its distance ahead of the body, m, and its height, m.
         """
-        gait = self._gait
-        since = max(0.0, time - self._start) % gait.cycle
+        gait = self._scene.gait
+        assert isinstance(gait, RailGait)
+        since = max(0.0, time - self._scene.settle) % gait.cycle
         if since < gait.stance:
             return True, 0.5 * gait.stroke * math.cos(math.pi * since / gait.stance), 0.0
         share = (since - gait.stance) / gait.swing
@@ -116,18 +114,19 @@ class RailLeg:
             When the sequence is not one finite pressure.
         """
         check_pressures(pressures, 1)
-        dt, state, foot = self.period, self.feet[0], self._foot
-        self._steps += 1
-        self.time = self._steps * dt
+        dt, state, foot, scene = self.period, self.feet[0], self._foot, self._scene
+        body = scene.body
+        assert isinstance(body, RailBody)
+        self.time = (round(self.time / dt) + 1) * dt
         stands, offset, height = self.plan(self.time)
         back = (self._offset - offset) / dt
-        if stands and not self._stands:
+        if stands and not state.standing:
             self._film.touch_down(self._floor.depth(self._x + offset, 0.0))
-        self._stands, self._offset = stands, offset
+        state.standing, self._offset = stands, offset
         cap = 0.0
         overloaded = False
         if stands:
-            load, pressure = self._body.load, pressures[0]
+            load, pressure = body.load, pressures[0]
             domes = foot.dome_load(load, pressure)
             overloaded = pressure > 0.0 and domes < load
             state.wet = self._floor.wet(self._x + offset, 0.0)
@@ -135,14 +134,13 @@ class RailLeg:
             if state.wet:
                 films = self._film.drain(domes, load - domes, pressure, dt)
             cap = foot.resistance_of(domes, load - domes, pressure, *films)
-        free = self.speed - self._downhill * dt
-        self.speed, force = push(free, back, cap, self._body, dt)
+        free = self.speed - GRAVITY * math.sin(scene.floor.slope) * dt
+        self.speed, force = push(free, back, cap, body, dt)
         self._x += self.speed * dt
         slip = self.speed - back if stands else 0.0
         # The marker is above the pads: their shear moves it away from the contact on the floor.
         state.position = (self._x + offset - force / foot.shear_stiffness, 0.0, height)
-        state.force = (force, 0.0, self._body.load if stands else 0.0)
-        state.standing = stands
+        state.force = (force, 0.0, body.load if stands else 0.0)
         state.grip = cap
         state.slip_speed = abs(slip)
         state.slip_path += abs(slip) * dt

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -43,6 +44,7 @@ class Proprioception(NamedTuple):
     forces: list[Vector]
 
 
+@dataclass(slots=True)
 class FootState:
     """The true state of one foot after a step, in world axes and SI units.
 
@@ -69,21 +71,15 @@ class FootState:
         Time for which the load was above the force limit of the domes, s.
     """
 
-    __slots__ = (
-        'force', 'grip', 'moment', 'overload_time', 'position', 'slip_path', 'slip_speed',
-        'standing', 'wet',
-    )  # fmt: skip
-
-    def __init__(self) -> None:
-        self.position: Vector = (0.0, 0.0, 0.0)
-        self.force: Vector = (0.0, 0.0, 0.0)
-        self.moment = 0.0
-        self.standing = False
-        self.wet = False
-        self.grip = 0.0
-        self.slip_speed = 0.0
-        self.slip_path = 0.0
-        self.overload_time = 0.0
+    position: Vector = (0.0, 0.0, 0.0)
+    force: Vector = (0.0, 0.0, 0.0)
+    moment: float = 0.0
+    standing: bool = False
+    wet: bool = False
+    grip: float = 0.0
+    slip_speed: float = 0.0
+    slip_path: float = 0.0
+    overload_time: float = 0.0
 
 
 def contacts_of(feet: Sequence[FootState]) -> Array:
@@ -151,12 +147,10 @@ def check_pressures(pressures: Sequence[float], legs: int) -> None:
     """Raise InvalidInput unless there is one finite gauge pressure, Pa, for each leg."""
     # If one value is not finite, the sum is not finite either.
     if len(pressures) != legs or not math.isfinite(sum(pressures)):
-        needed = (
-            'one finite number is'
-            if legs == 1
-            else f'{legs} finite numbers, one for each leg, are'
+        raise InvalidInput(
+            f'pressures = {pressures!r} Pa is not allowed: {legs} finite numbers are needed, one'
+            ' for each leg'
         )
-        raise InvalidInput(f'pressures = {pressures!r} Pa is not allowed: {needed} needed')
 
 
 def check_reach(scene: Scene) -> FeetSolver:
@@ -169,32 +163,24 @@ def check_reach(scene: Scene) -> FeetSolver:
         it, or a joint would be beyond the travel of its servo or its limits.
     """
     assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
-    robot, lift, stride = scene.body.robot, scene.gait.lift, scene.gait.stride
-    if not _miss(scene, lift, stride, scene.heading_gain):
-        return FeetSolver(robot)
-    if why := _miss(scene, 0.0, 0.0, 0.0):
-        heights = robot.foot_positions(robot.home)[:, 2]
-        raise ConfigError(
-            f'{scene.source}: robot {robot.source} cannot stand at home, where its feet are'
-            f' {heights.min():.3g} to {heights.max():.3g} m high in the base: {why}'
-        )
+    robot, gain = scene.body.robot, scene.heading_gain
+    lift, stride = scene.gait.lift, scene.gait.stride
     motions: tuple[tuple[str, float, str, Callable[[float], str]], ...] = (
         ('gait.lift', lift, 'm', lambda value: _miss(scene, value, 0.0, 0.0)),
         ('gait.stride', stride, 'm', lambda value: _miss(scene, lift, value, 0.0)),
-        (
-            'gait.heading_gain', scene.heading_gain, '1/s',
-            lambda value: _miss(scene, lift, stride, value),
-        ),
-    )  # fmt: skip
-    name, value, unit, miss = next(each for each in motions if each[3](each[1]))
-    low, high = 0.0, value
-    while high - low > 0.01 * value:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if miss(middle) else (middle, high)
-    raise ConfigError(
-        f'{scene.source}: {name} = {value:g} {unit} is not allowed: at most {low:.3g} {unit} is'
-        f' within reach of the legs of {robot.source} from its home: {miss(value)}'
+        ('gait.heading_gain', gain, '1/s', lambda value: _miss(scene, lift, stride, value)),
     )
+    for name, value, unit, miss in motions:
+        if why := miss(value):
+            low, high = 0.0, value
+            while high - low > 0.01 * value:
+                middle = 0.5 * (low + high)
+                low, high = (low, middle) if miss(middle) else (middle, high)
+            raise ConfigError(
+                f'{scene.source}: {name} = {value:g} {unit} is not allowed: at most {low:.3g}'
+                f' {unit} is within reach of the legs of {robot.source} from its home: {why}'
+            )
+    return FeetSolver(robot)
 
 
 def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:

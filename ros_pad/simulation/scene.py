@@ -4,25 +4,24 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import pathlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, Self
 
 from ros_pad import configuration
-from ros_pad.configuration import Table
+from ros_pad.configuration import Setting, Table
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Gait, Robot
-from ros_pad.simulation.faults import SENSOR_KINDS, Fault, listed
+from ros_pad.simulation.faults import AIR_KINDS, Fault, listed
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.terrain import FLOORS, Floor, patch_lengths
-
-T = TypeVar('T')
 
 LEAST_TRUNK = 0.01
 """Least share of a robot's mass that is not legs."""
@@ -31,6 +30,31 @@ METRICS = ('distance', 'slip')
 
 RAIL_LEG = 'rail_leg'
 """The robot of a scene with the leg on its rail."""
+
+
+def _number(
+    unit: str, low: float, high: float, default: Any = MISSING, key: str = '', needed: bool = False
+) -> Any:
+    """Return a field that a file gives as a number; its key is the field's name or ``key``.
+
+    A file must give what is ``needed`` or has no default.
+    """
+    ends = {'range': (unit, low, high), 'key': key, 'needed': needed or default is MISSING}
+    return field(default=default, metadata=ends)
+
+
+class _Part:
+    """A part of a scene, whose fields are the keys of its table in the file."""
+
+    @classmethod
+    def read(cls, table: Table, **known: Any) -> Self:
+        """Read the numbers of the part, except what is known."""
+        for each in fields(cls):  # type: ignore[arg-type]
+            if 'range' in each.metadata and each.name not in known:
+                default: Any = {} if each.metadata['needed'] else {'default': each.default}
+                key = each.metadata['key'] or each.name
+                known[each.name] = table.number(key, *each.metadata['range'], **default)
+        return cls(**known)
 
 
 @dataclass(frozen=True)
@@ -69,20 +93,15 @@ class LeggedBody:
     @classmethod
     def read(cls, table: Table, robot: Robot) -> LeggedBody:
         """Read the table ``body`` of a scene: what is not as in the robot's file."""
-        if not robot.mass > 0.0:
-            raise ConfigError(
-                f'{table.origin}: the links of robot {robot.name!r} have no mass: give them an'
-                ' <inertial> with <mass>'
-            )
         legs = sum(joint.mass for leg in robot.chains.legs for joint in leg)
-        if robot.mass - legs < LEAST_TRUNK * robot.mass:
+        if not robot.mass - legs > LEAST_TRUNK * robot.mass:
             raise ConfigError(
                 f'{table.origin}: the legs of robot {robot.name!r} have {legs:.4g} of its'
-                f' {robot.mass:.4g} kg: at most {1.0 - LEAST_TRUNK:.0%} is allowed; has its base a'
-                ' mass?'
+                f' {robot.mass:.4g} kg: less than {1.0 - LEAST_TRUNK:.0%} is needed; have base and'
+                ' links an <inertial> with <mass>?'
             )
         mass = table.number('mass', 'kg', 0.05, 2000.0, default=robot.mass)
-        inertia = robot.inertia * mass / robot.mass
+        inertia, stiffness = robot.inertia * mass / robot.mass, robot.leg_stiffness
         feet = robot.foot_positions(robot.home)[:, :2].round(12)
         return cls(
             robot=robot,
@@ -90,14 +109,12 @@ class LeggedBody:
             inertia=table.number('inertia', 'kg m2', 1e-5, 1000.0, default=inertia),
             height=table.number('height', 'm', 0.0, 5.0, default=robot.height),
             homes=tuple((float(x), float(y)) for x, y in feet),
-            leg_stiffness=table.number(
-                'leg_stiffness', 'N/m', 1.0, 1e7, default=robot.leg_stiffness
-            ),
+            leg_stiffness=table.number('leg_stiffness', 'N/m', 1.0, 1e7, default=stiffness),
         )
 
 
 @dataclass(frozen=True)
-class RailBody:
+class RailBody(_Part):
     """The thesis' walking mechanism on a rail (5.2): a body on wheels pushed by one foot.
 
     Attributes
@@ -112,24 +129,14 @@ class RailBody:
         Distance to the end of the rail, m.
     """
 
-    mass: float
-    rolling_drag: float
-    load: float
-    goal: float
-
-    @classmethod
-    def read(cls, table: Table) -> RailBody:
-        """Read the table ``body`` of a scene."""
-        return cls(
-            mass=table.number('mass', 'kg', 0.01, 100.0),
-            rolling_drag=table.number('rolling_drag', 'N', 0.0, 1000.0),
-            load=table.number('load', 'N', 0.01, 1000.0),
-            goal=table.number('goal', 'm', 0.01, 1000.0),
-        )
+    mass: float = _number('kg', 0.01, 100.0)
+    rolling_drag: float = _number('N', 0.0, 1000.0)
+    load: float = _number('N', 0.01, 1000.0)
+    goal: float = _number('m', 0.01, 1000.0)
 
 
 @dataclass(frozen=True)
-class RailGait:
+class RailGait(_Part):
     """The foot's stroke on the rail.
 
     Attributes
@@ -142,29 +149,33 @@ class RailGait:
         Height of the foot in the middle of its swing, m.
     """
 
-    stroke: float
-    stance: float
-    swing: float
-    lift: float
+    stroke: float = _number('m', 1e-3, 1.0)
+    stance: float = _number('s', 0.05, 60.0)
+    swing: float = _number('s', 0.05, 60.0)
+    lift: float = _number('m', 1e-3, 0.2)
 
     @property
     def cycle(self) -> float:
         """Duration of a cycle, s."""
         return self.stance + self.swing
 
-    @classmethod
-    def read(cls, table: Table) -> RailGait:
-        """Read the table ``gait`` of a scene."""
-        return cls(
-            stroke=table.number('stroke', 'm', 1e-3, 1.0),
-            stance=table.number('stance', 's', 0.05, 60.0),
-            swing=table.number('swing', 's', 0.05, 60.0),
-            lift=table.number('lift', 'm', 1e-3, 0.2),
-        )
+    @property
+    def stride(self) -> float:
+        """Advance of the body in a cycle without slip, m."""
+        return self.stroke
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest acceleration of the body, m/s²."""
+        return 0.5 * self.stroke * (math.pi / self.stance) ** 2
+
+    def body_advance(self, time: float) -> float:
+        """Return the advance of the body after whole cycles without slip, m."""
+        return self.stroke * (time / self.cycle)
 
 
 @dataclass(frozen=True)
-class Tow:
+class Tow(_Part):
     """A load that the robot tows over the floor, which requires tangential force of the feet.
 
     Attributes
@@ -181,28 +192,16 @@ class Tow:
         Stiffness of that line, N/m.
     """
 
-    weight: float = 0.0
-    friction_dry: float = 0.0
-    friction_wet: float = 0.0
-    distance: float = 0.0
-    height: float = 0.0
-    stiffness: float = 2000.0
-
-    @classmethod
-    def read(cls, table: Table) -> Tow:
-        """Read the table ``tow`` of a scene."""
-        return cls(
-            weight=table.number('weight', 'N', 0.0, 1e4),
-            friction_dry=table.number('friction_dry', '(coefficient)', 0.0, 3.0),
-            friction_wet=table.number('friction_wet', '(coefficient)', 0.0, 3.0),
-            distance=table.number('distance', 'm', 0.0, 10.0, default=cls.distance),
-            height=table.number('height', 'm', 0.0, 1.0, default=cls.height),
-            stiffness=table.number('stiffness', 'N/m', 1.0, 1e7, default=cls.stiffness),
-        )
+    weight: float = _number('N', 0.0, 1e4, 0.0, needed=True)
+    friction_dry: float = _number('(coefficient)', 0.0, 3.0, 0.0, needed=True)
+    friction_wet: float = _number('(coefficient)', 0.0, 3.0, 0.0, needed=True)
+    distance: float = _number('m', 0.0, 10.0, 0.0)
+    height: float = _number('m', 0.0, 1.0, 0.0)
+    stiffness: float = _number('N/m', 1.0, 1e7, 2000.0)
 
 
 @dataclass(frozen=True)
-class SensorNoise:
+class SensorNoise(_Part):
     """Rate and white noise of the sensors, and the bias of gyro and accelerometer.
 
     The defaults are about twice what data sheets of cheap parts promise (docs/model/sensors.md).
@@ -225,44 +224,21 @@ class SensorNoise:
         Standard deviation of position, rad, velocity, rad/s, and torque, N m, of a joint.
     """
 
-    rate: float
-    force: float
-    position: float
-    moment: float = 0.0
-    gyro: float = 0.005
-    accelerometer: float = 0.05
-    gyro_bias: float = 0.01
-    accelerometer_bias: float = 0.05
-    encoder: float = 5e-4
-    joint_velocity: float = 0.03
-    effort: float = 0.02
-
-    @classmethod
-    def read(cls, table: Table) -> SensorNoise:
-        """Read the table ``sensors`` of a scene."""
-        return cls(
-            rate=table.number('rate', 'Hz', 50.0, 1000.0),
-            force=table.number('force_noise', 'N', 0.0, 10.0),
-            position=table.number('position_noise', 'm', 0.0, 0.01),
-            moment=table.number('moment_noise', 'N m', 0.0, 1.0, default=cls.moment),
-            gyro=table.number('gyro_noise', 'rad/s', 1e-6, 1.0, default=cls.gyro),
-            accelerometer=table.number(
-                'accelerometer_noise', 'm/s2', 1e-6, 10.0, default=cls.accelerometer
-            ),
-            gyro_bias=table.number('gyro_bias', 'rad/s', 0.0, 1.0, default=cls.gyro_bias),
-            accelerometer_bias=table.number(
-                'accelerometer_bias', 'm/s2', 0.0, 5.0, default=cls.accelerometer_bias
-            ),
-            encoder=table.number('encoder_noise', 'rad', 1e-6, 0.1, default=cls.encoder),
-            joint_velocity=table.number(
-                'joint_velocity_noise', 'rad/s', 1e-6, 10.0, default=cls.joint_velocity
-            ),
-            effort=table.number('effort_noise', 'N m', 0.0, 100.0, default=cls.effort),
-        )
+    rate: float = _number('Hz', 50.0, 1000.0)
+    force: float = _number('N', 0.0, 10.0, key='force_noise')
+    position: float = _number('m', 0.0, 0.01, key='position_noise')
+    moment: float = _number('N m', 0.0, 1.0, 0.0, 'moment_noise')
+    gyro: float = _number('rad/s', 1e-6, 1.0, 0.005, 'gyro_noise')
+    accelerometer: float = _number('m/s2', 1e-6, 10.0, 0.05, 'accelerometer_noise')
+    gyro_bias: float = _number('rad/s', 0.0, 1.0, 0.01)
+    accelerometer_bias: float = _number('m/s2', 0.0, 5.0, 0.05)
+    encoder: float = _number('rad', 1e-6, 0.1, 5e-4, 'encoder_noise')
+    joint_velocity: float = _number('rad/s', 1e-6, 10.0, 0.03, 'joint_velocity_noise')
+    effort: float = _number('N m', 0.0, 100.0, 0.02, 'effort_noise')
 
 
 @dataclass(frozen=True)
-class FloorPlan:
+class FloorPlan(_Part):
     """Description of a floor; :meth:`build` makes the floor for a seed.
 
     Attributes
@@ -289,44 +265,31 @@ class FloorPlan:
     """
 
     kind: str
-    film_thickness: float
-    viscosity: float
+    film_thickness: float = _number('m', 1e-9, 0.01, 3e-4)
+    viscosity: float = _number('Pa s', 1e-5, 10.0, WATER_VISCOSITY)
     wet_fraction: float = 0.0
     patch_length: float = 0.0
     drawing: tuple[str, ...] = ()
     cell: float = 0.0
-    slope: float = 0.0
-    roughness: float = 0.0
-    unevenness: float = 0.0
+    slope: float = _number('rad', -0.5, 0.5, 0.0)
+    roughness: float = _number('m', 0.0, 1e-3, 0.0)
+    unevenness: float = _number('m', 0.0, 0.02, 0.0)
 
     @classmethod
-    def read(cls, table: Table) -> FloorPlan:
+    def read(cls, table: Table, **known: Any) -> Self:
         """Read the table ``floor`` of a scene."""
-        kind = table.choice('kind', FLOORS)
-        wet_fraction, patch_length = cls.wet_fraction, cls.patch_length
-        drawing, cell = cls.drawing, cls.cell
+        known['kind'] = kind = table.choice('kind', FLOORS)
         if kind == 'patches':
-            wet_fraction = table.number('wet_fraction', '(share)', 0.01, 0.99)
-            patch_length = table.number('patch_length', 'm', *patch_lengths(wet_fraction))
+            known['wet_fraction'] = share = table.number('wet_fraction', '(share)', 0.01, 0.99)
+            known['patch_length'] = table.number('patch_length', 'm', *patch_lengths(share))
         if kind == 'drawn':
-            drawing = tuple(table.text('drawing').split())
-            cell = table.number('cell', 'm', 1e-3, 10.0)
+            known['drawing'] = tuple(table.text('drawing').split())
+            known['cell'] = table.number('cell', 'm', 1e-3, 10.0)
             try:
-                Floor.drawn(drawing, cell, 0.0)
+                Floor.drawn(known['drawing'], known['cell'], 0.0)
             except InvalidInput as error:
                 raise ConfigError(f'{table.origin}: {error}') from error
-        return cls(
-            kind=kind,
-            film_thickness=table.number('film_thickness', 'm', 1e-9, 0.01, default=3e-4),
-            viscosity=table.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
-            wet_fraction=wet_fraction,
-            patch_length=patch_length,
-            drawing=drawing,
-            cell=cell,
-            slope=table.number('slope', 'rad', -0.5, 0.5, default=cls.slope),
-            roughness=table.number('roughness', 'm', 0.0, 1e-3, default=cls.roughness),
-            unevenness=table.number('unevenness', 'm', 0.0, 0.02, default=cls.unevenness),
-        )
+        return super().read(table, **known)
 
     def build(self, seed: int) -> Floor:
         """Return the floor for a seed."""
@@ -434,13 +397,13 @@ class Scene:
 
         Faults are texts, as in a ROS parameter. Faults of the sensors of feet are left out.
         """
-        faults = [str(each) for each in self.faults if each.kind not in SENSOR_KINDS]
+        faults = [str(each) for each in self.faults if each.kind in AIR_KINDS]
         return self.regulator | ({'faults': faults} if faults else {})
 
     @property
     def stride(self) -> float:
         """Distance of the body in a gait cycle without slip, m."""
-        return self.gait.stride if isinstance(self.gait, WalkingGait) else self.gait.stroke
+        return self.gait.stride
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> Scene:
@@ -501,38 +464,37 @@ class Scene:
                 f'pad run {source}, or with studies.thesis.bench.run'
             )
         robot = table.text('robot')
-        description = table.text('description', default='')
         foot = foot_of(table)
         body: LeggedBody | RailBody
         gait: WalkingGait | RailGait
+        tow, heading_gain = Tow(), 0.0
         if robot == RAIL_LEG:
-            body = _part(table, 'body', RailBody.read)
-            gait, heading_gain = _part(table, 'gait', RailGait.read), 0.0
+            body, gait = _part(table, 'body', RailBody.read), _part(table, 'gait', RailGait.read)
         else:
-            legs = _robot_of(table, robot)
+            legs = _robot_of(table)
             with table.table('body', default={}) as part:
                 body = LeggedBody.read(part, legs)
             with table.table('gait', default={}) as part:
-                gait, heading_gain = _walking_gait(part, legs)
+                gait = _walking_gait(part, legs)
+                heading_gain = part.number('heading_gain', '1/s', 0.0, 10.0, default=0.0)
+            if 'tow' in table:
+                tow = _part(table, 'tow', Tow.read)
+        pressure = Setting('dome_pressure', float, '', 'Pa', 1000.0, foot.ceiling)
         scene = cls(
             source=source,
             name=name,
-            description=description,
+            description=table.text('description', default=''),
             robot=robot,
             body=body,
             gait=gait,
             heading_gain=heading_gain,
             foot=foot,
             floor=_part(table, 'floor', FloorPlan.read),
-            tow=_part(table, 'tow', Tow.read) if 'tow' in table else Tow(),
+            tow=tow,
             sensors=_part(table, 'sensors', SensorNoise.read),
             regulator=_part(table, 'regulator', _air_line),
             policy=table.choice('policy', ('flat', 'dome', 'adaptive', 'oracle')),
-            dome_pressure=(
-                table.number('dome_pressure', 'Pa', 1000.0, foot.ceiling)
-                if 'dome_pressure' in table
-                else None
-            ),
+            dome_pressure=table.value(pressure) if 'dome_pressure' in table else None,
             settle=table.number('settle', 's', 0.0, 60.0, default=1.0),
             cycles=table.integer('cycles', 1, 100000),
             accuracy=table.number('accuracy', '(relative)', 1e-4, 1.0),
@@ -551,49 +513,41 @@ class Scene:
         return scene
 
 
-def _part(table: Table, key: str, read: Callable[[Table], T]) -> T:
+def _part(table: Table, key: str, read: Callable[[Table], Any]) -> Any:
     """Read a nested table; raise `ConfigError` for keys that ``read`` does not use."""
     with table.table(key) as part:
         return read(part)
 
 
-def foot_of(table: Table) -> Foot:
-    """Return the foot that a scene names; a path is relative to the folder of the scene's file."""
-    foot_name = table.text('foot')
-    if foot_name.endswith(('.yaml', '.yml')):
-        foot_name = os.fspath(pathlib.Path(table.origin).parent / foot_name)
-    try:
-        return Foot.load(foot_name)
-    except ConfigError as error:
-        raise ConfigError(f'{table.origin}: foot: {error}') from error
-
-
-def _robot_of(table: Table, name: str) -> Robot:
-    """Return the robot that a scene names; a path is relative to the scene's folder."""
+def _named(table: Table, key: str, load: Callable[[str], Any]) -> Any:
+    """Load what a scene names; a path is relative to the folder of the scene's file."""
+    name = table.text(key)
     if name.endswith(('.yaml', '.yml')):
         name = os.fspath(pathlib.Path(table.origin).parent / name)
-    elif name.endswith('.urdf'):
-        raise ConfigError(
-            f'{table.origin}: robot = {name!r}: a scene needs feet, posture, gait and servos too:'
-            ' name a YAML file with the key urdf, see docs/robots.md'
-        )
     try:
-        robot = Robot.load(name, foot_radius=0.0)
-    except ConfigError as error:
-        raise ConfigError(f'{table.origin}: robot: {error}') from error
+        return load(name)
+    except (ConfigError, InvalidInput) as error:
+        raise ConfigError(f'{table.origin}: {key}: {error}') from error
+
+
+def foot_of(table: Table) -> Foot:
+    """Return the foot that a scene names; a path is relative to the folder of the scene's file."""
+    foot: Foot = _named(table, 'foot', Foot.load)
+    return foot
+
+
+def _robot_of(table: Table) -> Robot:
+    robot: Robot = _named(table, 'robot', lambda name: Robot.load(name, foot_radius=0.0))
     if robot.gait is None:
         raise ConfigError(
-            f'{table.origin}: robot = {name!r}: its file has no key gait, which a walk'
-            ' needs: add it, see docs/robots.md'
+            f'{table.origin}: robot = {table.text("robot")!r}: a walk needs a YAML file with feet,'
+            ' posture, gait and servos, see docs/robots.md'
         )
     return robot
 
 
-def _walking_gait(table: Table, robot: Robot) -> tuple[WalkingGait, float]:
-    """Read a gait, and the rate at which it steers back to heading zero, 1/s.
-
-    What the table does not have is as in the robot's file.
-    """
+def _walking_gait(table: Table, robot: Robot) -> WalkingGait:
+    """Read a gait; what the table does not have is as in the robot's file."""
     steps = Gait.read(table, robot.hips, robot.gait)
     gait = WalkingGait(
         cycle=steps.cycle,
@@ -603,12 +557,12 @@ def _walking_gait(table: Table, robot: Robot) -> tuple[WalkingGait, float]:
         middles=tuple((0.25 + phase) % 1.0 for phase in steps.phases),
         pushes=steps.pushes,
     )
-    if not gait.pushes:
-        # A walk begins in the middle of the time in which one leg has landed and none lifted off.
-        start = 0.5 * (gait.duty - gait.overlap)
-        middles = tuple((start + phase) % 1.0 for phase in steps.phases)
-        gait = dataclasses.replace(gait, middles=middles)
-    return gait, table.number('heading_gain', '1/s', 0.0, 10.0, default=0.0)
+    if gait.pushes:
+        return gait
+    # A walk begins in the middle of the time in which one leg has landed and none lifted off.
+    start = 0.5 * (gait.duty - gait.overlap)
+    middles = tuple((start + phase) % 1.0 for phase in steps.phases)
+    return dataclasses.replace(gait, middles=middles)
 
 
 def _air_line(table: Table) -> dict[str, Any]:

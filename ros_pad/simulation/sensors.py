@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.records import SAMPLE, Array
-from ros_pad.simulation.faults import BODY_KINDS, Fault, sensor_faults_of
+from ros_pad.simulation.faults import BODY_KINDS, FOOT_KINDS, Fault, faults_of
 from ros_pad.simulation.robot import Proprioception, SimulatedRobot
 from ros_pad.simulation.scene import Scene, SensorNoise
 
@@ -50,7 +50,7 @@ class Sensors:
     @classmethod
     def of(cls, scene: Scene, seed: int) -> Sensors:
         """Return the sensors of a scene's robot."""
-        faults = [sensor_faults_of(leg, scene.faults) for leg in scene.legs]
+        faults = [faults_of(leg, scene.faults, FOOT_KINDS) for leg in scene.legs]
         return cls(scene.sensors, len(scene.legs), seed, faults)
 
     def sample(self, robot: SimulatedRobot) -> np.ndarray:
@@ -158,7 +158,7 @@ class BodySensors:
             (noise.encoder, noise.joint_velocity, noise.effort), joints
         ).reshape(3, joints)
         self._faults = [fault for fault in scene.faults if fault.kind in BODY_KINDS]
-        self._of_feet = [sensor_faults_of(leg, scene.faults) for leg in scene.legs]
+        self._of_feet = [faults_of(leg, scene.faults, FOOT_KINDS) for leg in scene.legs]
         self._last: Array | None = None
 
     def read(self, truth: Proprioception, time: float) -> BodyReading:

@@ -18,7 +18,7 @@ from ros_pad.records import Array
 from ros_pad.simulation.mujoco_model import POINT
 from ros_pad.simulation.robot import FootState, check_pressures
 from ros_pad.simulation.scene import Scene, Tow
-from ros_pad.simulation.terrain import Floor, Spot
+from ros_pad.simulation.terrain import Floor
 
 LIGHT = 0.05
 """Load, N, below which the friction coefficient no longer changes with the load."""
@@ -54,28 +54,13 @@ class Sole(FootState):
         Gauge pressure in the pads, Pa, and force limit of the domes at that pressure, N.
     cleared : bool
         Whether it left the ground in its present or last swing.
-    ahead : tuple or None
-        For what film and friction were set while it had no load, see :meth:`Soles.update`.
     """
 
-    __slots__ = (
-        'ahead',
-        'block',
-        'cleared',
-        'film',
-        'friction',
-        'limit',
-        'pressure',
-        'ratio',
-        'spot',
-    )
-
-    def __init__(self, film: Film, friction: Any, block: Any, spot: Spot) -> None:
+    def __init__(self, film: Film, friction: Any, block: Any) -> None:
         super().__init__()
-        self.film, self.friction, self.block, self.spot = film, friction, block, spot
+        self.film, self.friction, self.block = film, friction, block
         self.ratio = self.pressure = self.limit = 0.0
         self.cleared = True
-        self.ahead: tuple[float, bool, bool] | None = None
 
 
 class Soles:
@@ -100,6 +85,8 @@ class Soles:
         Lever of friction against turning about the vertical, m.
     dissipation : float
         Work lost in feet that slip or turn, J.
+    contacts : array (feet, 7)
+        Force, N, yaw moment, N m, and position of the marker, m, of each foot.
     """
 
     def __init__(
@@ -118,7 +105,6 @@ class Soles:
                 # Scalars go through a memoryview faster than through an array.
                 memoryview(model.pair(f'foot_{leg}').friction),
                 None if floor.heights is None else memoryview(data.mocap_pos[index]),
-                Spot(floor),
             )
             for index, leg in enumerate(scene.legs)
         ]
@@ -128,12 +114,10 @@ class Soles:
         self._axes = data.geom_xmat[feet, :6]  # x and y rows of their rotation
         self._last: tuple[list[list[float]], list[list[float]]] = ([], [])
         self._loads = data.sensordata[::6]
-        self._touch = _Touch(data.sensordata, self._places, 1.0 / foot.shear_stiffness)
-
-    @property
-    def contacts(self) -> Array:
-        """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
-        return self._touch.contacts
+        self._felt = data.sensordata.reshape(-1, 6)
+        give = 1.0 / foot.shear_stiffness
+        self._give = np.array((give, give, 0.0))
+        self.contacts: Array = np.zeros((count, 7))
 
     @property
     def feet(self) -> list[Sole]:
@@ -180,7 +164,6 @@ class Soles:
         """Set the friction of each standing foot for the next step, from its load in the last."""
         for sole, load in zip(self._soles, self._loads.tolist(), strict=True):
             if load > LIGHT:
-                sole.ahead = None
                 self.press(sole, load, self._dt)
 
     def press(self, sole: Sole, load: float, drained: float) -> None:
@@ -200,7 +183,13 @@ class Soles:
 
     def update(self) -> None:
         """Set contacts, slip and the work lost in it, after the last step of MuJoCo."""
-        pushes_x, pushes_y, loads, moments = self._touch.measure()
+        # The axes of a contact with level ground are z, y, -x. Pads shear by force/stiffness.
+        contacts, felt = self.contacts, self._felt
+        contacts[:, :3] = felt[:, 2::-1] * (-1.0, 1.0, 1.0)
+        contacts[:, 3] = felt[:, 3]
+        contacts[:, 4:] = self._places - contacts[:, :3] * self._give
+        contacts[:, 6] -= POINT
+        pushes_x, pushes_y, loads, moments = contacts[:, :4].T.tolist()
         places, axes = self._places.tolist(), self._axes.tolist()
         last_places, last_axes = self._last
         self._last = places, axes
@@ -208,7 +197,7 @@ class Soles:
         for index, sole in enumerate(self._soles):
             (x, y, z), load = places[index], loads[index]
             sole.slip_speed = 0.0
-            sole.wet = sole.spot.wet(x, y)
+            sole.wet = self._floor.wet(x, y)
             if load <= LIGHT:
                 sole.grip = sole.ratio * load
                 self._approach(sole, x, y, z - POINT)
@@ -236,39 +225,9 @@ class Soles:
                 sole.block[2] = self._floor.height(x, y)
         if z > ground + clear:
             sole.cleared = True
-        left = z > ground + CLEAR
-        ahead = (sole.pressure, sole.wet, left)
-        if ahead != sole.ahead:  # else film and friction are as they were set last
-            sole.ahead = ahead
-            if left:
-                sole.film.touch_down(self._floor.depth(x, y))
-            self.press(sole, LIGHT, 0.0)
-
-
-class _Touch:
-    """Forces, moments and markers of all feet, from MuJoCo's arrays at once.
-
-    Rows of its table are force x, y and z, moment, and what is between place and marker.
-    """
-
-    def __init__(self, felt: Array, places: Array, give: float) -> None:
-        count = len(places)
-        # The axes of a contact with level ground are z, y, -x.
-        order = 6 * np.arange(count) + np.array([[2], [1], [0], [3], [2], [1]])
-        self._felt, self._order = felt, order.ravel()
-        self._factors = np.repeat((-1.0, 1.0, 1.0, 1.0, -give, give, POINT), count)
-        self._raw, self._table = np.ones((2, 7 * count))
-        rows = self._table.reshape(7, count)
-        self.contacts = rows.T
-        self._views = self._raw[: 6 * count], rows[:4], rows[4:], places.T
-
-    def measure(self) -> list[list[float]]:
-        """Set the contacts; return forces along x, y and z, N, and moments, N m, of all feet."""
-        felt, wrenches, markers, places = self._views
-        self._felt.take(self._order, None, felt, 'clip')
-        np.multiply(self._raw, self._factors, self._table)
-        np.subtract(places, markers, markers)
-        return wrenches.tolist()
+        if z > ground + CLEAR:
+            sole.film.touch_down(self._floor.depth(x, y))
+        self.press(sole, LIGHT, 0.0)
 
 
 class Sled:
@@ -283,7 +242,7 @@ class Sled:
     def __init__(self, tow: Tow, floor: Floor, model: Any, data: Any) -> None:
         self.distance = tow.distance
         self._frictions = (tow.friction_dry, tow.friction_wet)
-        self._spot = Spot(floor)
+        self._floor = floor
         self._place: Any = memoryview(data.geom('sled').xpos)
         self._friction: Any = memoryview(model.pair('sled').friction)
 
@@ -291,7 +250,7 @@ class Sled:
         """Set its friction for the next step of MuJoCo."""
         x, y, _ = self._place
         row = self._friction
-        row[0] = row[1] = self._frictions[self._spot.wet(x, y)]
+        row[0] = row[1] = self._frictions[self._floor.wet(x, y)]
 
 
 def _turn(before: Sequence[float], now: Sequence[float]) -> float:

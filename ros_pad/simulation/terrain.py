@@ -50,30 +50,10 @@ def _field(smoothing: float, seed: int, stream: int) -> np.ndarray:
     integer('seed', seed)
     shape = (round(WIDTH / CELL), round(LENGTH / CELL))
     noise = np.random.default_rng([seed, stream]).normal(size=shape)
-    return smoothed(noise, smoothing / CELL)
+    from scipy.ndimage import gaussian_filter  # here, because many floors have no patches
 
-
-def smoothed(cells: np.ndarray, deviation: float) -> np.ndarray:
-    """Return cells smoothed by a Gaussian kernel along both axes, on which they are periodic.
-
-    With the same bits as gaussian_filter of SciPy, which takes longer to import than to smooth a
-    floor. The standard deviation is in cells.
-    """
-    radius = int(4.0 * deviation + 0.5)
-    weights = np.exp(-0.5 / (deviation * deviation) * np.arange(-radius, radius + 1) ** 2)
-    weights = (weights / weights.sum())[radius:]
-    for _ in range(2):
-        count = len(cells)
-        padded = np.pad(cells, ((radius, radius), (0, 0)), mode='wrap')
-        cells = padded[radius : radius + count] * weights[0]
-        both = np.empty_like(cells)
-        for away in range(radius, 0, -1):
-            low, high = radius - away, radius + away
-            np.add(padded[low : low + count], padded[high : high + count], out=both)
-            both *= weights[away]
-            cells += both
-        cells = np.ascontiguousarray(cells.T)
-    return cells
+    field: np.ndarray = gaussian_filter(noise, smoothing / CELL, mode='wrap')
+    return field
 
 
 @dataclass(frozen=True)
@@ -139,11 +119,7 @@ class Floor:
 
     @classmethod
     def patches(
-        cls,
-        wet_fraction: float,
-        patch_length: float,
-        film_thickness: float,
-        seed: int,
+        cls, wet_fraction: float, patch_length: float, film_thickness: float, seed: int
     ) -> Floor:
         """Return random patches: a smoothed Gaussian field, wet where it is high.
 
@@ -175,11 +151,7 @@ class Floor:
         >>> round(float(floor.wet_map.mean()), 3), floor.depth(0.0, 0.0)  # m
         (0.4, 0.0003)
         """
-        if number('wet_fraction', wet_fraction, '(share)', high=1.0) in (0.0, 1.0):
-            raise InvalidInput(
-                f'wet_fraction = {wet_fraction!r} is not allowed: a number above 0 and below 1 is'
-                ' needed'
-            )
+        number('wet_fraction', wet_fraction, '(share)', 1e-6, 1.0 - 1e-6)
         number('patch_length', patch_length, 'm', *patch_lengths(wet_fraction))
         level = _field(_smoothing(wet_fraction, patch_length), seed, 1)
         wet = level > np.quantile(level, 1.0 - wet_fraction)
@@ -211,19 +183,12 @@ class Floor:
             When rows differ in length, are missing or have other characters, or when ``cell`` or
             ``film_thickness`` is out of its range.
         """
-        if not drawing or not drawing[0]:
-            raise InvalidInput('drawing is empty: rows of # (wet) and . (dry) are needed')
-        for place, row in enumerate(drawing, 1):
-            if len(row) != len(drawing[0]):
-                raise InvalidInput(
-                    f'drawing: row {place} has {len(row)} characters and row 1 has'
-                    f' {len(drawing[0])}: all rows must be of the same length'
-                )
-            if odd := set(row) - set('#.'):
-                raise InvalidInput(
-                    f'drawing: row {place} contains {min(odd)!r}: only # (wet) and . (dry) are'
-                    ' allowed'
-                )
+        wide = len(drawing[0]) if drawing else 0
+        if not wide or any(len(row) != wide or set(row) - set('#.') for row in drawing):
+            raise InvalidInput(
+                f'drawing = {drawing!r} is not allowed: rows of one length of # (wet) and . (dry)'
+                ' are needed'
+            )
         number('cell', cell, 'm', above=True)
         # Rows of the map go along +y, those of a drawing against it.
         wet = np.array([[each == '#' for each in row] for row in reversed(drawing)])
@@ -328,33 +293,3 @@ class Floor:
         row = np.floor_divide(np.asarray(y) - self.origin[1], self.cell).astype(int) % rows
         column = np.floor_divide(np.asarray(x) - self.origin[0], self.cell).astype(int) % columns
         return self.wet_map[row, column]
-
-
-class Spot:
-    """A place that moves over a floor: it looks only when it comes into another cell.
-
-    Parameters
-    ----------
-    floor : Floor
-        The floor.
-    """
-
-    __slots__ = ('_floor', '_left', '_low', '_right', '_top', '_wet')
-
-    def __init__(self, floor: Floor) -> None:
-        self._floor = floor
-        self._wet = False
-        self._left = self._right = self._low = self._top = 0.0
-
-    def wet(self, x: float, y: float) -> bool:
-        """Return :meth:`Floor.wet` at a position."""
-        if not (self._left < x < self._right and self._low < y < self._top):
-            floor, (start_x, start_y) = self._floor, self._floor.origin
-            self._wet = floor.wet(x, y)
-            # Less than the cell: at its very edge it looks each time.
-            edge = 1e-6 * floor.cell
-            cell = floor.cell - 2.0 * edge
-            self._left = start_x + (x - start_x) // floor.cell * floor.cell + edge
-            self._low = start_y + (y - start_y) // floor.cell * floor.cell + edge
-            self._right, self._top = self._left + cell, self._low + cell
-        return self._wet

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from ros_pad.trials.label import AMBIENT_PRESSURE
@@ -38,59 +38,49 @@ def rows(trial: Trial) -> list[tuple[str, str]]:
     The values come from ``settings['conditions']``, which `ros_pad.trials.label.described` made
     when the trial ran.
     """
-    settings = trial.settings
-    recorded, source = settings.get('conditions'), 'as recorded with the trial'
-    if not isinstance(recorded, Mapping):
-        recorded, source = {}, 'no scene is on record: only the following conditions are known'
-    found = [('conditions', source)]
-    if trial.scene:
-        found.append(('scene', _scene_words(trial, recorded)))
-    found.append(('policy', trial.policy or 'not on record'))
-    if trial.scene:
-        found.append(('seed of floor and noise', str(trial.seed)))
-    if trial.fidelity:
-        found.append(('simulation', trial.fidelity))
-    for key, name in _PARTS.items():
-        if key in recorded:
-            text = _listed(recorded[key])
-            if key == 'body':
-                text = f'{recorded.get("robot", "robot")}: {text}'
-                text += f', steering {recorded.get("heading_gain", 0.0):g} 1/s'
-            found.append((name, text))
-        elif key == 'foot' and settings.get('foot'):
-            found.append((name, str(settings['foot'])))
-    if recorded.get('dome_pressure'):
-        found.append(('pressure of a dome', f'{recorded["dome_pressure"]:g} Pa gauge, fixed'))
-    elif recorded:
-        found.append(('pressure of a dome', 'from the load and the measured force limit'))
+    settings, own = trial.settings, trial.metrics
+    known = settings.get('conditions')
+    recorded = known if isinstance(known, Mapping) else {}
+    words = (
+        trial.scene,
+        recorded.get('description'),
+        f'{own.cycles:.4g} gait cycles' if own else '',
+    )
+    parts = {name: _listed(recorded[key]) for key, name in _PARTS.items() if key in recorded}
+    if 'robot' in parts:
+        parts['robot'] = f'{recorded.get("robot")}: {parts["robot"]}'
+    pressure = 'from the load and the measured force limit' if recorded else ''
+    if fixed := recorded.get('dome_pressure'):
+        pressure = f'{fixed:g} Pa gauge, fixed'
     # Simulated trials run at the default ambient pressure.
     ambient = settings.get(
         'ambient_pressure', AMBIENT_PRESSURE.default if trial.fidelity else None
     )
-    if ambient is not None:
-        found.append(('ambient pressure', f'{ambient:g} Pa'))
-    found.append(('scheduled faults', '; '.join(settings.get('faults', ())) or 'none'))
-    if 'recorded' in settings:
-        found.append(('recorded', str(settings['recorded'])))
-    versions = {'ros_pad': settings['version']} if 'version' in settings else {}
-    versions |= settings.get('versions') or {}
-    found.append(
-        (
-            'versions',
-            ', '.join(f'{name} {each}' for name, each in versions.items()) or 'not on record',
-        )
-    )
-    found.append(('git', str(settings.get('git') or 'not on record')))
-    if again := repeated_by(trial):
-        found.append(('command to repeat it', again))
-    return found
+    versions = settings.get('versions') or {'ros_pad': settings.get('version', 'not on record')}
+    found = {
+        'conditions': 'as recorded with the trial' if recorded else 'no scene is on record:'
+        ' only the following conditions are known',
+        'scene': '; '.join(filter(None, words)) if trial.scene else '',
+        'policy': trial.policy or 'not on record',
+        'seed of floor and noise': str(trial.seed) if trial.scene else '',
+        'simulation': trial.fidelity,
+        'foot': str(settings.get('foot') or ''),
+        **parts,
+        'pressure of a dome': pressure,
+        'ambient pressure': '' if ambient is None else f'{ambient:g} Pa',
+        'scheduled faults': '; '.join(settings.get('faults', ())) or 'none',
+        'recorded': settings.get('recorded', ''),
+        'versions': ', '.join(f'{name} {each}' for name, each in versions.items()),
+        'command to repeat it': _repeated_by(trial) if trial.scene and trial.fidelity and own
+        else '',
+    }  # fmt: skip
+    return [(name, text) for name, text in found.items() if text]
 
 
-def repeated_by(trial: Trial) -> str | None:
-    """Return the command that repeats a simulated trial; None without simulation or metrics."""
+def _repeated_by(trial: Trial) -> str:
+    """Return the command that repeats a simulated trial."""
     own = trial.metrics
-    if not trial.scene or not trial.fidelity or own is None:
-        return None
+    assert own
     words = ['pad', 'run', trial.scene, '--policy', trial.policy, '--seed', str(trial.seed)]
     words += ['--fidelity', trial.fidelity]
     whole = not own.verdict and not trial.settings.get('interrupted')
@@ -101,35 +91,22 @@ def repeated_by(trial: Trial) -> str | None:
     return shlex.join(words)
 
 
-def _scene_words(trial: Trial, values: Mapping[str, Any]) -> str:
-    words = [trial.scene]
-    if values.get('description'):
-        words.append(str(values['description']))
-    if trial.metrics is not None:
-        words.append(f'{trial.metrics.cycles:.4g} gait cycles')
-    return '; '.join(words)
-
-
-def _listed(values: Mapping[str, Any]) -> str:
-    return ', '.join(_items(values))
-
-
-def _items(values: Mapping[str, Any], of: str = '') -> Iterator[str]:
+def _listed(values: Mapping[str, Any], of: str = '') -> str:
+    """Return the values of a part of a scene with their units, without those that are not used."""
+    found = []
     for name, each in values.items():
         words = f'{of}{name.replace("_", " ")}'
-        if each is None or each == () or each == [] or name in ('homes', 'middles'):
-            continue
-        if name in ('cell', 'wet_fraction', 'patch_length') and not each:  # not used by this floor
+        unused = name in ('cell', 'wet_fraction', 'patch_length') and not each
+        if each in (None, (), []) or name in ('homes', 'middles') or unused:
             continue
         if isinstance(each, Mapping):
-            yield from _items(each, f'{words} ')
+            found.append(_listed(each, f'{words} '))
         elif isinstance(each, bool) or not isinstance(each, (int, float)):
-            yield f'{words} {each}' if name != 'source' else str(each)
+            found.append(str(each) if name == 'source' else f'{words} {each}')
         else:
-            unit = _UNITS.get(name, '')
-            if of.endswith('measured limit '):
-                unit = {'slope': 'N/Pa'}.get(name, unit)
-            yield f'{words} {each:.6g} {unit}'.rstrip()
+            unit = 'N/Pa' if words.endswith('measured limit slope') else _UNITS.get(name, '')
+            found.append(f'{words} {each:.6g} {unit}'.rstrip())
+    return ', '.join(found)
 
 
-__all__ = ['repeated_by', 'rows']
+__all__ = ['rows']

@@ -14,13 +14,12 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import metadata
-from typing import Any, NamedTuple
+from typing import Any
 
 import ros_pad
 from ros_pad.bags import BagReader
 from ros_pad.configuration import Setting
 from ros_pad.errors import BagError
-from ros_pad.estimation.tuning import EXPECTED_LOAD
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.pneumatics import ATMOSPHERE
 from ros_pad.simulation.scene import FloorPlan, Scene
@@ -100,42 +99,11 @@ def label(
     }
 
 
-class About(NamedTuple):
-    """What the custom data of a bag say of its trial, and defaults for what they do not say.
+def read(bag: BagReader) -> dict[str, Any]:
+    """Return what a bag says of its trial: fields of :class:`ros_pad.trials.Trial`, by name.
 
-    Attributes
-    ----------
-    known : bool
-        Whether they say anything.
-    scene, policy, fidelity : str
-        Empty where they are not known.
-    seed : int
-    floor : FloorPlan or None
-    ambient_pressure : float
-        Absolute, Pa.
-    metrics : Metrics or None
-    settings : dict
-        See :func:`settings`.
-    expected_load : float
-        Of the settings, N.
-    real_time_factor : float or None
-    """
-
-    known: bool
-    scene: str
-    policy: str
-    fidelity: str
-    seed: int
-    floor: FloorPlan | None
-    ambient_pressure: float
-    metrics: Metrics | None
-    settings: dict[str, Any]
-    expected_load: float
-    real_time_factor: float | None
-
-
-def read(bag: BagReader) -> About:
-    """Return what a bag says of its trial.
+    Texts are empty, others None or 0, where it says nothing; ``settings`` have at least the
+    ``ambient_pressure``, Pa.
 
     Raises
     ------
@@ -144,20 +112,15 @@ def read(bag: BagReader) -> About:
     """
     try:
         noted = json.loads(bag.custom_data.get(KEY, '{}'))
-        recorded = dict(noted.get('settings') or {})
-        return About(
-            bool(noted),
-            str(noted.get('scene') or ''),
-            str(noted.get('policy') or ''),
-            str(noted.get('fidelity') or ''),
-            int(noted.get('seed') or 0),
-            FloorPlan(**noted['floor']) if noted.get('floor') else None,
-            float(noted.get('ambient_pressure', AMBIENT_PRESSURE.default)),
-            Metrics(**noted['metrics']) if noted.get('metrics') else None,
-            recorded,
-            float(recorded.get('expected_load', EXPECTED_LOAD.default)),
-            noted.get('real_time_factor'),
-        )
+        seed = int(noted.get('seed') or 0)
+        ambient = float(noted.get('ambient_pressure', AMBIENT_PRESSURE.default))
+        return {name: str(noted.get(name) or '') for name in ('scene', 'policy', 'fidelity')} | {
+            'seed': seed,
+            'floor': FloorPlan(**noted['floor']).build(seed) if noted.get('floor') else None,
+            'metrics': Metrics(**noted['metrics']) if noted.get('metrics') else None,
+            'settings': dict(noted.get('settings') or {}) | {'ambient_pressure': ambient},
+            'real_time_factor': noted.get('real_time_factor'),
+        }
     except (AttributeError, TypeError, ValueError) as error:
         raise BagError(
             f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
@@ -187,13 +150,12 @@ def made_with() -> dict[str, str]:
 
 def _git(folder: pathlib.Path, *words: str) -> str:
     """Return the output of git in a folder; empty where git fails or is not installed."""
-    try:
-        done = subprocess.run(
-            ['git', '-C', str(folder), *words], capture_output=True, text=True, timeout=5.0
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return ''
-    return done.stdout.strip() if done.returncode == 0 else ''
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        return subprocess.run(
+            ['git', '-C', str(folder), *words],
+            capture_output=True, text=True, timeout=5.0, check=True,
+        ).stdout.strip()  # fmt: skip
+    return ''
 
 
 def promise(trial: Trial) -> str:
@@ -207,7 +169,12 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
     """Return what pages and replays show of a trial's settings: scene, level and versions."""
     choice = levels.choose(scene, fidelity, policy)
     known = [asdict(each) for each in terms(scene, choice.level, policy)]
-    return marks(scene) | {
+    return {
+        'foot': scene.foot.source,
+        'expected_load': scene.expected_load,
+        'stride_m': scene.stride,
+        'cycle_s': scene.gait.cycle,
+        'settle_s': scene.settle,
         'sensing': sensing,
         'faults': [str(fault) for fault in scene.faults],
         # JSON has no infinity.
@@ -216,20 +183,8 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
         'omitted': [each for each in known if not each['taken']],
         'taken': [each for each in known if each['taken']],
         'version': ros_pad.__version__,
-        'versions': {name: each for name, each in made_with().items() if name != 'git'},
-        'git': made_with().get('git'),
+        'versions': made_with(),
         'conditions': described(scene),
-    }
-
-
-def marks(scene: Scene) -> dict[str, Any]:
-    """Return the settings by which a scene is recognised."""
-    return {
-        'foot': scene.foot.source,
-        'expected_load': scene.expected_load,
-        'stride_m': scene.stride,
-        'cycle_s': scene.gait.cycle,
-        'settle_s': scene.settle,
     }
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import os
 import pathlib
@@ -12,8 +13,14 @@ from typing import Any
 from ros_pad.configuration import Table
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError, PadError
-from ros_pad.estimation.scales import CLASSES, NEXT_FLOOR, SCALE_SD, SCALE_SD_RANGE, FrictionScales
-from ros_pad.estimation.tuning import SETTINGS
+from ros_pad.estimation.scales import (
+    CLASSES,
+    NEXT_FLOOR,
+    SCALE_RANGE,
+    SCALE_SD,
+    SCALE_SD_RANGE,
+    FrictionScales,
+)
 
 FILE = 'learnt.yaml'
 """Name of the file in the folder of a trial."""
@@ -41,14 +48,15 @@ def save(path: str | os.PathLike[str], settings: dict[str, float], foot: Foot) -
     PadError
         When the file cannot be written.
     """
+    known = {
+        n: {'scale': settings[f'scale.{n}'], 'sd': settings[f'scale_sd.{n}']} for n in CLASSES
+    }
     lines = [
-        f'{name}: {{scale: {settings[f"scale.{name}"]}, sd: {settings[f"scale_sd.{name}"]}}}\n'
-        for name in CLASSES
+        f'{name}: {json.dumps(each)}\n' for name, each in ({'foot': foot.source} | known).items()
     ]
-    source = foot.source.replace("'", "''")
     new = pathlib.Path(f'{os.fspath(path)}.new')
     try:
-        new.write_text(f"{_HEAD}foot: '{source}'\n{''.join(lines)}", encoding='utf-8')
+        new.write_text(_HEAD + ''.join(lines), encoding='utf-8')
         new.replace(path)
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -75,19 +83,16 @@ def load(path: str | os.PathLike[str], foot: str) -> dict[str, Any]:
         When the file cannot be read, is of another foot, or a key or value is not allowed.
     """
     table = Table.load(path)
-    other = table.text('foot')
-    if other != foot:
+    if (other := table.text('foot')) != foot:
         raise ConfigError(
             f'{table.origin}: foot = {other!r} is not allowed: it was learnt with another foot'
             f' than {foot!r}, which this robot has'
         )
-    ranges = {each.name: (each.low, each.high) for each in SETTINGS}
     found = {}
     for name in CLASSES:
         with table.table(name) as part:
-            for key, setting in (('scale', f'scale.{name}'), ('sd', f'scale_sd.{name}')):
-                found[setting] = part.number(key, '', *ranges[setting])
-        sd = found[f'scale_sd.{name}']
+            found[f'scale.{name}'] = part.number('scale', '', *SCALE_RANGE)
+            sd = part.number('sd', '', *SCALE_SD_RANGE)
         found[f'scale_sd.{name}'] = max(sd, min(math.hypot(sd, NEXT_FLOOR), SCALE_SD))
     table.finish()
     return found

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ros_pad.control import MorphologyController
-from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block
+from ros_pad.records import COMMAND, ESTIMATE, KINDS, PRESSURE, SAMPLE, Block, Kind
 from ros_pad.simulation.robot import SimulatedRobot, Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
@@ -35,17 +36,11 @@ class TrialLog:
     def __init__(
         self, scene: Scene, policy: str, seed: int, fidelity: str, sensing: str = 'markers'
     ) -> None:
-        self._scene = scene
-        self._policy = policy
-        self._seed = seed
-        self._fidelity = fidelity
-        self._sensing = sensing
-        self._samples: list[Block] = []
+        self._scene, self._sensing = scene, sensing
+        self._about: dict[str, Any] = {'policy': policy, 'seed': seed, 'fidelity': fidelity}
+        self._blocks: dict[Kind, list[Block]] = {kind: [] for kind in KINDS}
         self._body: list[Vector] = []
         self._odom: list[Vector] = []
-        self._estimates: list[Block] = []
-        self._commands: list[Block] = []
-        self._pressures: list[Block] = []
 
     def samples(
         self, block: Block, body: Sequence[Vector], odom: Sequence[Vector] | None = None
@@ -54,26 +49,21 @@ class TrialLog:
 
         ``odom`` is the estimated body, in whose frame the feet are then.
         """
-        self._samples.append(block)
+        self._blocks[SAMPLE].append(block)
         self._body += body
         self._odom += odom or ()
 
     def control(self, estimate: Block, command: Block, pressure: Block) -> None:
         """Add the records of a control moment."""
-        self._estimates.append(estimate)
-        self._commands.append(command)
-        self._pressures.append(pressure)
+        self._blocks[ESTIMATE].append(estimate)
+        self._blocks[COMMAND].append(command)
+        self._blocks[PRESSURE].append(pressure)
 
     @property
     def records(self) -> Records:
         """All records until now."""
         legs = len(self._scene.legs)
-        return Records(
-            Block.joined(SAMPLE, self._samples, legs),
-            Block.joined(ESTIMATE, self._estimates, legs),
-            Block.joined(COMMAND, self._commands, legs),
-            Block.joined(PRESSURE, self._pressures, legs),
-        )
+        return Records(*(Block.joined(kind, own, legs) for kind, own in self._blocks.items()))
 
     def finish(
         self,
@@ -84,19 +74,18 @@ class TrialLog:
     ) -> Trial:
         """Return the trial with its series, settings and metrics."""
         records = self.records
-        found = series(records)
+        found = series(*records)
         rows = np.isin(records.sample.stamps, found['time'])
         found |= {name: found[name] * 1e-9 for name in ('time', 'slow_time')}
+        about = self._about
         trial = Trial(
             scene=self._scene.name,
-            policy=self._policy,
-            fidelity=self._fidelity,
-            seed=self._seed,
+            **about,
             legs=self._scene.legs,
             body=np.array(self._body).reshape(-1, 3)[rows],
             **found,
             floor=floor,
-            settings=settings(self._scene, self._policy, self._fidelity, self._sensing),
+            settings=settings(self._scene, about['policy'], about['fidelity'], self._sensing),
             real_time_factor=real_time_factor,
             odom=np.array(self._odom).reshape(-1, 3)[rows[: len(self._odom)]],
         )

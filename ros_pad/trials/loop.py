@@ -9,23 +9,23 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ros_pad.configuration import choice, instance
+from ros_pad.configuration import choice, instance, integer
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import MorphologyController, first_morphologies, policy_named
 from ros_pad.control.stage import DecisionStage
-from ros_pad.errors import InvalidInput, TransportError
+from ros_pad.errors import TransportError
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace, Progress
 from ros_pad.pipeline import Pipeline
 from ros_pad.records import SAMPLE, Block
-from ros_pad.regulators import SimulatedRegulator, create
+from ros_pad.regulators import Regulator, create
 from ros_pad.regulators.channel import DEFAULTS as SUPERVISION
 from ros_pad.regulators.channel import SupervisedChannel
 from ros_pad.regulators.supervision import Supervision
@@ -42,21 +42,6 @@ from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.node_settings import body_settings_for, tuning_for
 from ros_pad.trials.trial import Trial, heading
-
-
-def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> SimulatedRegulator:
-    """Return the simulated regulator of one foot of a scene, with the faults of its leg."""
-    foot = scene.foot
-    regulator = create(
-        'simulated',
-        clock=clock,
-        ceiling=foot.ceiling,
-        pad_volume=foot.air_volume,
-        faults=faults_of(leg, scene.faults),
-        **scene.regulator,
-    )
-    assert isinstance(regulator, SimulatedRegulator)
-    return regulator
 
 
 class BodySensing:
@@ -80,18 +65,14 @@ class BodySensing:
     """
 
     def __init__(self, scene: Scene, seed: int, robot: FullRobot) -> None:
-        self._robot = robot
-        self._sensors = BodySensors(scene, seed, len(robot.joint_names))
         assert isinstance(scene.body, LeggedBody)
+        self._robot, self._sensors = robot, BodySensors(scene, seed, len(robot.joint_names))
         model, values = scene.body.robot, body_settings_for(scene)
         self.stage = SensingStage(
-            model,
-            estimator_of(model, values),
-            self._take,
-            lambda doubt: None,
+            model, estimator_of(model, values), self._take, lambda doubt: None,
             lambda error: None,  # the stage reports repeated rejections as a doubt
             values['forces'],
-        )
+        )  # fmt: skip
         self.estimate: BodyEstimate | None = None
         self.odom = (math.nan, math.nan, math.nan)
 
@@ -142,7 +123,8 @@ class ClosedLoop:
     pipeline : Pipeline
         Estimation and decision; see :meth:`connect`.
     supervision : Supervision
-    controller : MorphologyController
+    level : str
+        Fidelity level.
     pads : list of float
         True gauge pressures of the pads at the last control step, Pa.
 
@@ -164,32 +146,19 @@ class ClosedLoop:
         policy_parameters: Mapping[str, Any] | None = None,
         sensing: str = 'markers',
     ) -> None:
-        if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise InvalidInput(f'seed = {seed!r} is not allowed: a whole number from 0 is needed')
+        choice('sensing', sensing, SOURCES)
+        self.level = levels.level(scene, fidelity, policy, sensing == 'joints')
         self.period_ns = round(1e9 / scene.sensors.rate)
-        self.floor = scene.floor.build(seed)
-        fidelity = levels.level(scene, fidelity, joints=sensing == 'joints')
-        period = self.period_ns * 1e-9
-        self.robot = levels.build(with_terms(scene), self.floor, period, fidelity)
+        self.floor = scene.floor.build(integer('seed', seed))
+        self.robot = levels.build(with_terms(scene), self.floor, self.period_ns * 1e-9, self.level)
         self.sensors = Sensors.of(scene, seed)
         self._stamp_ns = 0
-        tuning = tuning or tuning_for(scene, sensing)
         self.body: BodySensing | None = None
         if sensing == 'joints':
             assert isinstance(self.robot, FullRobot)
             self.body = BodySensing(scene, seed, self.robot)
-        controller = MorphologyController(
-            scene.foot,
-            scene.legs,
-            policy_named(policy, self.floor.wet, policy_parameters),
-            scene.expected_load,
-            start=first_morphologies(policy, scene.legs),
-            fixed_pressure=scene.dome_pressure,
-            command_timeout=SUPERVISION.command_timeout,
-        )
         channels = [
-            SupervisedChannel(leg, simulated_regulator(scene, leg, self._clock), SUPERVISION)
-            for leg in scene.legs
+            SupervisedChannel(leg, self._regulator(scene, leg), SUPERVISION) for leg in scene.legs
         ]
         for channel in channels:
             try:
@@ -202,9 +171,30 @@ class ClosedLoop:
         self.supervision.activate(0)
         self.pads = [0.0] * len(scene.legs)
         self._tick_pace = Pace(TICK_PERIOD_NS)
-        self._scene, self._tuning = scene, tuning
+        self._scene, self._tuning = scene, tuning or tuning_for(scene, sensing)
         self._block: list[tuple[int, np.ndarray | None, Vector, Vector]] = []
-        self.connect(controller)
+        self.connect(
+            MorphologyController(
+                scene.foot,
+                scene.legs,
+                policy_named(policy, self.floor.wet, policy_parameters),
+                scene.expected_load,
+                start=first_morphologies(policy, scene.legs),
+                fixed_pressure=scene.dome_pressure,
+                command_timeout=SUPERVISION.command_timeout,
+            )
+        )
+
+    def _regulator(self, scene: Scene, leg: int) -> Regulator:
+        """Return the simulated regulator of a foot, with the faults of its leg."""
+        return create(
+            'simulated',
+            clock=lambda: self._stamp_ns * 1e-9,
+            ceiling=scene.foot.ceiling,
+            pad_volume=scene.foot.air_volume,
+            faults=faults_of(leg, scene.faults),
+            **scene.regulator,
+        )
 
     def connect(
         self,
@@ -223,15 +213,16 @@ class ClosedLoop:
         period_ns : int
             Period of estimates, decisions and readings of the regulators, ns.
         """
-        scene, self.controller = self._scene, controller
-        self._pace = Pace(period_ns)
+        scene, self._pace = self._scene, Pace(period_ns)
         estimation = EstimationStage(
             foot or scene.foot, scene.expected_load, self._tuning, scene.legs, period_ns
         )
         self.pipeline = Pipeline(estimation, DecisionStage(controller, scene.legs))
 
-    def _clock(self) -> float:
-        return self._stamp_ns * 1e-9
+    @property
+    def controller(self) -> MorphologyController:
+        """What decides for all legs."""
+        return self.pipeline.decision.controller
 
     def tick(self, log: TrialLog) -> None:
         """Advance by one sample; at control moments, process the samples since the last one."""
@@ -263,8 +254,8 @@ class ClosedLoop:
 
     def _samples(self, log: TrialLog) -> Block:
         """Return the collected samples, and log them; a control moment without one has NaN."""
-        taken, self._block = self._block, []
-        *rest, last = taken
+        *rest, last = self._block
+        self._block = []
         if last[1] is None:
             last = (last[0], SAMPLE.rows(len(self._scene.legs)), *last[2:])
         stamps, rows, body, odom = zip(
@@ -344,10 +335,8 @@ def run(
     policy = scene.policy if policy is None else policy
     if tuning is not None:
         instance('tuning', tuning, Tuning)
-    choice('sensing', sensing, SOURCES)
-    level = levels.level(scene, fidelity, policy, sensing == 'joints')
-    loop = ClosedLoop(scene, policy, seed, level, tuning, policy_parameters, sensing)
-    log = TrialLog(scene, policy, seed, level, sensing)
+    loop = ClosedLoop(scene, policy, seed, fidelity, tuning, policy_parameters, sensing)
+    log = TrialLog(scene, policy, seed, loop.level, sensing)
     started = time.perf_counter()
     samples = round(scene.duration * 1e9) // loop.period_ns
     try:

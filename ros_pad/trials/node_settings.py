@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import os
@@ -15,9 +14,9 @@ from ros_pad.configuration import Setting, choice
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphologies, policy_named
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
-from ros_pad.control.policies import PREFIX, Policy
+from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.errors import BagError, ConfigError, InvalidInput, LimitError, reason
+from ros_pad.errors import BagError, InvalidInput, LimitError, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
@@ -30,21 +29,19 @@ from ros_pad.trials.label import AMBIENT_PRESSURE, PARAMETERS
 if TYPE_CHECKING:
     from ros_pad.bags import BagReader
 
-OWN = (
-    EXPECTED_LOAD,
-    Setting(
-        'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
-        'Pa', 0.0, 1e6,
-    ),
-    MARGIN,
-    LIFT_OFF,
-    COMMAND_TIMEOUT,
-    AMBIENT_PRESSURE,
-    PUBLISH_RATE,
-)  # fmt: skip
-"""Settings that are single numbers in :class:`NodeSettings`."""
-
-_ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
+KNOWN = {
+    each.name: each
+    for each in (
+        EXPECTED_LOAD,
+        Setting(
+            'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
+            'Pa', 0.0, 1e6,
+        ),
+        MARGIN, LIFT_OFF, COMMAND_TIMEOUT, AMBIENT_PRESSURE, PUBLISH_RATE, *SETTINGS,
+        *POLICY_SETTINGS,
+    )
+}  # fmt: skip
+"""Parameters of estimator and controller that a replay can change, by name."""
 
 SHAKING = 0.3
 """Error of an acceleration as the mean of a sample while the robot walks, m/s²: its steps are
@@ -55,8 +52,7 @@ Value: TypeAlias = 'float | int | bool | str'
 
 def body_settings_for(scene: Scene) -> dict[str, Any]:
     """Return the settings of the body estimator for the sensors of a scene, by name."""
-    sensors = scene.sensors
-    share = 0.0
+    sensors, share = scene.sensors, 0.0
     if isinstance(scene.body, LeggedBody) and scene.body.mass != scene.body.robot.mass:
         # The estimator has the mass of the robot's file; the scene's robot has another one.
         share = min(max(0.1 * scene.body.mass / scene.body.robot.mass, 0.01), 0.9)
@@ -93,33 +89,14 @@ class NodeSettings:
     Attributes
     ----------
     foot : Foot
-    expected_load : float
-        Load of a foot in stance, N.
-    tuning : Tuning
-        Tuning of the estimators; a yaw moment is used if its noise is above 0.
     policy : str
         ``flat``, ``dome``, ``adaptive`` or ``oracle``.
-    policy_parameters : dict
-        Parameters of the adaptive policy. Other policies have none, but the values are kept for a
-        later change to adaptive.
-    dome_pressure : float
-        Gauge pressure of every dome, Pa; 0 chooses it from the load.
-    margin : float
-        Pressure margin: factor on the load when the pressure of a dome is chosen.
-    lift_off_share : float
-        Share of the expected load below which a foot has lifted off.
-    command_timeout : float
-        Time without a set-point after which a regulator vents its pad, s.
-    ambient_pressure : float
-        Absolute pressure around the robot, Pa.
-    publish_rate : float
-        Rate of the estimates, Hz.
+    values : dict
+        Parameters of both nodes by name, those of :data:`KNOWN`; defaults where they are left out.
+        Policies other than adaptive have no parameters, but their values are kept for a later
+        change to adaptive.
     floor : Floor or None
         True ground, which an oracle needs.
-    scene : str
-        Name or path of the scene; empty where it is unknown.
-    seed : int
-        Seed of floor and noise.
     legs : tuple of int
         Numbers of the legs of the robot; empty where they are unknown.
     assumed : tuple of str
@@ -127,32 +104,23 @@ class NodeSettings:
     """
 
     foot: Foot
-    expected_load: float
-    tuning: Tuning
     policy: str
-    policy_parameters: dict[str, Any] = field(default_factory=dict)
-    dome_pressure: float = 0.0
-    margin: float = MARGIN.default
-    lift_off_share: float = LIFT_OFF.default
-    command_timeout: float = COMMAND_TIMEOUT.default
-    ambient_pressure: float = AMBIENT_PRESSURE.default
-    publish_rate: float = PUBLISH_RATE.default
+    values: dict[str, Any] = field(default_factory=dict)
     floor: Floor | None = None
-    scene: str = ''
-    seed: int = 0
     legs: tuple[int, ...] = ()
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for setting in OWN:
-            setting.accept(getattr(self, setting.name))
+        given = self.values
+        values = {n: each.accept(given.get(n, each.default)) for n, each in KNOWN.items()}
+        object.__setattr__(self, 'values', values)
 
     @classmethod
     def of(cls, bag: BagReader) -> NodeSettings:
         """Return the settings of the nodes of a bag, and defaults for those that it lacks.
 
         They come from the recorded parameters of estimator and controller, as in bags of ros_pad's
-        recorder, or else from the scene that the bag names.
+        recorder.
 
         Parameters
         ----------
@@ -167,33 +135,31 @@ class NodeSettings:
             When the foot of the bag is not found.
         """
         about = label.read(bag)
-        settings = _of_label(about)
-        parameters = _parameters(bag)
-        if parameters:
-            try:
-                return _of_nodes(settings, *parameters)
-            except (KeyError, TypeError, ValueError) as error:
-                raise BagError(
-                    f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator'
-                    f' or controller is missing or not valid: {reason(error)}'
-                ) from error
-        if not about.known:
-            assumed = (
-                'the bag lacks the settings of its nodes: foot large37, policy adaptive,'
-                f' expected_load {settings.expected_load:g} N and the default noise are assumed'
-            )
-            return replace(settings, assumed=(assumed,))
+        told = about['settings']
+        foot, policy = told.get('foot', 'large37'), about['policy'] or 'adaptive'
         try:
-            scene = Scene.load(settings.scene)
-        except ConfigError:
-            assumed = f'scene {settings.scene!r} of the bag cannot be read: default noise is used'
-            return replace(settings, assumed=(assumed,))
-        return replace(
-            settings,
-            tuning=tuning_for(scene),
-            dome_pressure=scene.dome_pressure or 0.0,
-            legs=tuple(scene.legs),
-        )
+            nodes = list(json.loads(bag.custom_data.get(PARAMETERS, '{}')).values())
+            # Find the nodes by their parameters, because users may rename nodes.
+            estimators = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
+            controllers = [each for each in nodes if {'policy', 'margin'} <= each.keys()]
+            if len(estimators) != 1 or len(controllers) != 1:
+                values = {name: told[name] for name in KNOWN if name in told}
+                assumed = (
+                    f'the bag lacks the parameters of its nodes: foot {foot}, policy {policy},'
+                    f' expected_load {values.get("expected_load", EXPECTED_LOAD.default):g} N and'
+                    ' the default noise are assumed'
+                )
+                return cls(Foot.load(foot), policy, values, about['floor'], assumed=(assumed,))
+            values, floor = told | estimators[0] | controllers[0], about['floor']
+            if floor is None and values.get('scene'):
+                floor = Scene.load(values['scene']).floor.build(int(values.get('seed', 0)))
+            legs = tuple(values['legs'])
+            return cls(Foot.load(values['foot']), str(values['policy']), values, floor, legs)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise BagError(
+                f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator or'
+                f' controller is missing or not valid: {reason(error)}'
+            ) from error
 
     def changed(
         self,
@@ -217,56 +183,33 @@ class NodeSettings:
         ConfigError, InvalidInput
             When a name or value is not allowed; the message names it, and what is allowed.
         """
-        tuning, of_policy, own = {}, {}, {}
-        known = [*(each.name for each in (*OWN, *POLICY_SETTINGS)), *_ESTIMATOR]
-        for name, value in (values or {}).items():
-            if name not in known:
-                near = difflib.get_close_matches(name, known, n=1)
-                hint = f' Did you mean {near[0]!r}?' if near else ''
-                raise InvalidInput(
-                    f'parameter {name!r} is unknown.{hint} Allowed: {", ".join(known)}'
-                )
-            if name in _ESTIMATOR:
-                tuning[_ESTIMATOR[name]] = value
-            elif name.startswith(PREFIX):
-                of_policy[name.removeprefix(PREFIX)] = value
-            else:
-                own[name] = value
-        policy = policy or self.policy
+        values = dict(values or {})
+        for name in values:
+            choice('parameter', name, tuple(KNOWN))
         try:
-            if of_policy:
-                policy_named(policy, parameters=of_policy)  # raises unless policy is adaptive
-            changes: dict[str, Any] = {
-                **own,
-                'tuning': replace(self.tuning, **tuning),  # type: ignore[arg-type]
-                'policy': policy,
-                'policy_parameters': self.policy_parameters | of_policy,
-            }
-            if foot is not None:
-                changes['foot'] = Foot.load(foot)
-            settings = replace(self, **changes)
-            settings.rules()
+            settings = replace(
+                self,
+                foot=self.foot if foot is None else Foot.load(foot),
+                policy=policy or self.policy,
+                values=self.values | values,
+            )
+            if of_policy := _of_policy(values):
+                policy_named(settings.policy, parameters=of_policy)  # raises unless it is adaptive
             settings.controller(settings.legs or (1,))
         except (InvalidInput, LimitError) as error:
-            given = ', '.join(f'{name}={value}' for name, value in (values or {}).items())
+            given = ', '.join(f'{name}={value}' for name, value in values.items())
             raise InvalidInput(f'{given}: {error}' if given else str(error)) from error
         return settings
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values that :meth:`changed` can change, by the same names."""
-        return (
-            {each.name: getattr(self, each.name) for each in OWN}
-            | {name: getattr(self.tuning, place) for name, place in _ESTIMATOR.items()}
-            | {PREFIX + name: value for name, value in (self._of_policy() or {}).items()}
-        )
+        kept = self.policy == 'adaptive'
+        return {n: each for n, each in self.values.items() if kept or not n.startswith(PREFIX)}
 
-    def _of_policy(self) -> dict[str, Any] | None:
-        return self.policy_parameters if self.policy == 'adaptive' else None
-
-    def rules(self) -> Policy:
-        """Return the policy with its parameters and, for an oracle, the true ground."""
-        is_wet = self.floor.wet if self.floor else None
-        return policy_named(self.policy, is_wet, self._of_policy())
+    @property
+    def tuning(self) -> Tuning:
+        """Tuning of the estimators; a yaw moment is used if its noise is above 0."""
+        return Tuning(**{attribute(each): self.values[each.name] for each in SETTINGS})
 
     def controller(self, legs: Sequence[int]) -> MorphologyController:
         """Return a new controller.
@@ -276,82 +219,21 @@ class NodeSettings:
         legs : sequence of int
             Its legs, from 1.
         """
+        is_wet, values = self.floor.wet if self.floor else None, self.values
+        parameters = _of_policy(values) if self.policy == 'adaptive' else None
         return MorphologyController(
             self.foot,
             legs,
-            self.rules(),
-            self.expected_load,
+            policy_named(self.policy, is_wet, parameters),
+            values['expected_load'],
             start=first_morphologies(self.policy, legs),
-            margin=self.margin,
-            fixed_pressure=self.dome_pressure or None,
-            lift_off_share=self.lift_off_share,
-            command_timeout=self.command_timeout,
+            margin=values['margin'],
+            fixed_pressure=values['dome_pressure'] or None,
+            lift_off_share=values['lift_off_share'],
+            command_timeout=values['command_timeout'],
         )
 
 
-def _of_label(about: label.About) -> NodeSettings:
-    """Return the settings that follow from the description of the trial in a bag."""
-    return NodeSettings(
-        Foot.load(about.settings.get('foot', 'large37')),
-        about.expected_load,
-        Tuning(),
-        about.policy or 'adaptive',
-        ambient_pressure=about.ambient_pressure,
-        floor=about.floor.build(about.seed) if about.floor else None,
-        scene=about.scene,
-        seed=about.seed,
-    )
-
-
-def _parameters(bag: BagReader) -> tuple[dict[str, Any], dict[str, Any]] | None:
-    """Return the recorded parameters of estimator and controller.
-
-    None unless the bag has those of exactly one estimator and one controller.
-    """
-    try:
-        nodes = list(json.loads(bag.custom_data.get(PARAMETERS, '{}')).values())
-        # Find the nodes by their parameters, because users may rename nodes.
-        estimators = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
-        controllers = [each for each in nodes if {'policy', 'margin'} <= each.keys()]
-    except (AttributeError, TypeError, ValueError) as error:
-        raise BagError(
-            f'{bag.path}: custom data {PARAMETERS!r} do not list parameters of nodes: {error}'
-        ) from error
-    if len(estimators) == len(controllers) == 1:
-        return estimators[0], controllers[0]
-    return None
-
-
-def _of_nodes(
-    settings: NodeSettings, estimator: dict[str, Any], controller: dict[str, Any]
-) -> NodeSettings:
-    """Return settings with the recorded parameters of the two nodes."""
-    tuning = {place: estimator[name] for name, place in _ESTIMATOR.items() if name in estimator}
-    of_policy = {
-        each.name.removeprefix(PREFIX): controller[each.name]
-        for each in POLICY_SETTINGS
-        if each.name in controller
-    }
-    own = {
-        each.name: controller.get(each.name, each.default)
-        for each in (MARGIN, LIFT_OFF, COMMAND_TIMEOUT)
-    }
-    floor, seed = settings.floor, settings.seed
-    if floor is None and controller.get('scene'):
-        seed = int(controller.get('seed', 0))
-        floor = Scene.load(controller['scene']).floor.build(seed)
-    return replace(
-        settings,
-        foot=Foot.load(controller['foot']),
-        expected_load=float(controller['expected_load']),
-        tuning=Tuning(**tuning),
-        policy=str(controller['policy']),
-        dome_pressure=float(controller['dome_pressure']),
-        policy_parameters=of_policy,
-        **own,
-        ambient_pressure=float(controller.get('ambient_pressure', settings.ambient_pressure)),
-        publish_rate=float(estimator['publish_rate']),
-        floor=floor,
-        seed=seed,
-        legs=tuple(controller['legs']),
-    )
+def _of_policy(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of the adaptive policy among those of nodes."""
+    return {n.removeprefix(PREFIX): each for n, each in values.items() if n.startswith(PREFIX)}

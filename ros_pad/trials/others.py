@@ -21,15 +21,8 @@ from ros_pad.trials.trial import Metrics, Trial
 SHORTEST = 15.0
 """Duration of a scene, s, from which processes are worth their start."""
 
-NICENESS = 5
-"""How much the other processes stand back behind the trial itself, see nice(2)."""
-
 Bar: TypeAlias = 'Callable[[str, float], AbstractContextManager[Progress]]'
 """Shows the progress of a text up to a total."""
-
-
-def _walk(run: Callable[..., Trial], policy: str) -> Metrics | None:
-    return run(policy=policy).metrics
 
 
 class Others:
@@ -44,12 +37,11 @@ class Others:
         sensing: str = 'markers',
         tuning: Tuning | None = None,
     ) -> None:
-        self._duration = scene.duration
+        self._duration, self._policies = scene.duration, policies
         self._run = partial(
             loop.run, scene, seed=seed, fidelity=level, tuning=tuning, sensing=sensing
         )
-        self._policies = policies
-        self._walks: dict[str, Future[Metrics | None]] = {}
+        self._walks: dict[str, Future[Trial]] = {}
 
     @contextmanager
     def beside(self) -> Iterator[Others]:
@@ -58,9 +50,9 @@ class Others:
         if free < 1 or self._duration < SHORTEST:
             yield self
             return
-        with workers.pool(free, os.nice, NICENESS) as executor:
+        with workers.pool(free, os.nice, 5) as executor:  # behind the trial itself
             for policy in self._policies:
-                self._walks[policy] = executor.submit(_walk, self._run, policy)
+                self._walks[policy] = executor.submit(self._run, policy=policy)
             yield self
 
     def metrics(self, bar: Bar) -> dict[str, Metrics]:
@@ -72,14 +64,15 @@ class Others:
             As :func:`ros_pad.trials.loop.run`.
         """
         # From the last on: the others begin with the first.
-        found = {policy: self._of(policy, bar) for policy in reversed(self._policies)}
-        return {policy: each for policy in self._policies if (each := found[policy]) is not None}
+        trials = {policy: self._of(policy, bar) for policy in reversed(self._policies)}
+        found = {policy: trials[policy].metrics for policy in self._policies}
+        return {policy: each for policy, each in found.items() if each is not None}
 
-    def _of(self, policy: str, bar: Bar) -> Metrics | None:
+    def _of(self, policy: str, bar: Bar) -> Trial:
         walk = self._walks.get(policy)
         with bar(f'{policy:8} on the same ground', self._duration) as progress:
             # A cancelled walk would let the others wait for ever if a process is killed.
             if walk and (walk.running() or walk.done()):
                 with suppress(BrokenProcessPool):  # killed, possibly for lack of memory
                     return walk.result()
-            return self._run(policy=policy, progress=progress).metrics
+            return self._run(policy=policy, progress=progress)

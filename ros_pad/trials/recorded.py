@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import difflib
 import json
 import os
 import pathlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,26 +24,44 @@ from ros_pad.bags import BagReader
 from ros_pad.bags.reader import Table
 from ros_pad.bags.recovery import KEY as REPAIR
 from ros_pad.bags.topics import BODY_POSE, DIAGNOSTICS, ODOM, STAMP, TRIAL, Topic, to_record
+from ros_pad.configuration import choice
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.pace import LATE, Progress, part
 from ros_pad.records import KINDS, Block, Kind
 from ros_pad.trials import label
-from ros_pad.trials.series import Records, by_row, held, series
+from ros_pad.trials.comparison import Stream
+from ros_pad.trials.series import by_row, held, series
 from ros_pad.trials.trial import Trial, heading
 
-_OF_LEG = re.compile(r'(?P<namespace>.*?/)leg_(?P<leg>\d+)/(?P<kind>\w+)')
-POSES = (BODY_POSE, ODOM)
-
 _KNOWN = {topic.pattern: topic for topic in TRIAL}
-# A log time after 2001 is a date, an earlier one is simulated time.
-_FIRST_DATE_NS = 10**18
+_FIRST_DATE_NS = 10**18  # a log time after 2001 is a date, an earlier one is simulated time
+
+
+class Recording(NamedTuple):
+    """What a bag has of a robot.
+
+    Attributes
+    ----------
+    legs : tuple of int
+    streams : dict of Stream
+        Records by name of their kind, in the order of their stamps; also those that drivers
+        published by leg, whose other fields are missing.
+    topics : dict of str
+        Topic of those that were recorded as records, by name of their kind.
+    poses : dict of Table
+        What was recorded of the pose of the body.
+    """
+
+    legs: tuple[int, ...]
+    streams: dict[str, Stream]
+    topics: dict[str, str]
+    poses: dict[Topic, Table]
 
 
 def load(
     folder: str | os.PathLike[str],
     namespace: str | None = None,
     progress: Progress | None = None,
-    remaps: Mapping[str, str] | None = None,
 ) -> Trial:
     """Read a trial from a bag.
 
@@ -56,8 +73,6 @@ def load(
         Namespace of the robot, such as ``/robot_1``; None takes the only one.
     progress : callable or None
         Called now and then with the share that is done, 0 to 1.
-    remaps : mapping or None
-        Topics with other names, see :func:`wanted_topics`.
 
     Returns
     -------
@@ -71,158 +86,146 @@ def load(
     BagError
         When there is no such bag, when it has no topic of a leg or several robots, when a topic
         has another message type than in ros_pad, or when its custom data are not those of ros_pad.
-    InvalidInput
-        When a remap is not allowed.
     """
     bag = BagReader(folder, part(progress, 0.0, 0.4))
-    wanted = wanted_topics(bag, namespace, remaps)
-    first = 0.4 if bag.problem else 0.0  # a bag without damage is opened at once
-    trial = _described(bag)
-    ambient = trial['settings']['ambient_pressure']
-    legs, records, _, tables = read_records(bag, wanted, ambient, part(progress, first, 0.8))
-    found = series(records)
-    fast_ns = found.pop('time')
-    slow_ns = found.pop('slow_time')
-    odom = np.zeros((0, 3))
-    body = _poses(tables, BODY_POSE, fast_ns)
-    if (estimated := _poses(tables, ODOM, fast_ns)) is not None:
-        odom = estimated
-        body = odom if body is None else body
+    about = label.read(bag)
+    settings = about['settings']
+    settings['lost'] = dict(json.loads(bag.custom_data.get(label.LOST, '{}')))
+    settings['repaired'] = REPAIR in bag.custom_data
+    if bag.problem:
+        settings['problem'] = bag.problem
+    recording = read(
+        bag, settings['ambient_pressure'], namespace, progress=part(progress, 0.4, 0.8)
+    )
+    settings['late'] = []
+    with contextlib.suppress(BagError):  # a trial can be read without it
+        settings['late'] = late(bag, part(progress, 0.8, 1.0))
+    if progress:
+        progress(1.0)
+    found = series(*(recording.streams[kind.name].block for kind in KINDS))
+    body, odom = (_poses(recording, topic, found['time']) for topic in (BODY_POSE, ODOM))
+    if body is None:
+        body = np.full((len(found['time']), 3), np.nan) if odom is None else odom
     zero_ns = 0
     if bag.start > _FIRST_DATE_NS:
         zero_ns = bag.start
         moment = datetime.datetime.fromtimestamp(bag.start // 10**9, datetime.UTC)
-        trial['settings']['recorded'] = f'{moment:%Y-%m-%d %H:%M:%S} UTC'
-    if bag.problem:
-        trial['settings']['problem'] = bag.problem
-    trial['settings']['late'] = []
-    with contextlib.suppress(BagError):  # a trial can be read without it
-        trial['settings']['late'] = late(bag, part(progress, 0.8, 1.0))
-    if progress:
-        progress(1.0)
-    read = Trial(
-        **trial,
+        settings['recorded'] = f'{moment:%Y-%m-%d %H:%M:%S} UTC'
+    found |= {name: (found[name] - zero_ns) * 1e-9 for name in ('time', 'slow_time')}
+    about['scene'] = pathlib.PurePath(about['scene']).stem
+    trial = Trial(
+        **about,
         **found,
-        legs=legs,
-        time=(fast_ns - zero_ns) * 1e-9,
-        slow_time=(slow_ns - zero_ns) * 1e-9,
-        body=np.full((len(fast_ns), 3), np.nan) if body is None else body,
-        odom=odom,
+        legs=recording.legs,
+        body=body,
+        odom=np.zeros((0, 3)) if odom is None else odom,
     )
-    if len(odom):
-        read.move_to_world()
-    return read
+    if odom is not None:
+        trial.move_to_world()
+    return trial
 
 
-def _poses(tables: Mapping[Topic, Table], topic: Topic, grid: np.ndarray) -> np.ndarray | None:
+def _poses(recording: Recording, topic: Topic, grid: np.ndarray) -> np.ndarray | None:
     """Return x and y, m, and heading, rad, at times, ns, (n, 3); None if they are not recorded."""
-    if topic not in tables:
+    if topic not in recording.poses:
         return None
-    stamps, values = _stamped(*tables[topic])
+    stamps, _, values = _stamped(*recording.poses[topic])
     poses = np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
     return held(stamps, poses, grid)
 
 
-def _stamped(log_times: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return stamps, ns, and values of a table that begins with stamps, in their order."""
-    seconds, nanoseconds = table[:, :2].astype(np.int64).T
-    stamps = seconds * 10**9 + nanoseconds
-    stamps = np.where(stamps == 0, log_times, stamps)  # a driver may leave the stamp empty
+def _stamped(times: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return stamps, log times, ns, and values of a table that begins with stamps, in order."""
+    stamps = table[:, :2].astype(np.int64) @ np.array([10**9, 1])
+    stamps = np.where(stamps == 0, times, stamps)  # a driver may leave the stamp empty
     order = np.argsort(stamps, kind='stable')
-    return stamps[order], table[order, 2:]
+    return stamps[order], np.sort(times), table[order, 2:]
 
 
-def read_records(
+def read(
     bag: BagReader,
-    wanted: Mapping[str, Wanted],
     ambient: float,
+    namespace: str | None = None,
+    remaps: Mapping[str, str] | None = None,
     progress: Progress | None = None,
-) -> tuple[tuple[int, ...], Records, dict[str, np.ndarray], dict[Topic, Table]]:
-    """Return the records of a robot in a bag, also those that its drivers published by leg.
+) -> Recording:
+    """Return what was recorded of a robot.
+
+    Where there are records, what drivers published by leg for them is left out.
 
     Parameters
     ----------
     bag : BagReader
         What was recorded.
-    wanted : mapping
-        What each topic is, see :func:`wanted_topics`.
     ambient : float
         Ambient pressure, Pa: drivers publish absolute pressures.
+    namespace : str or None
+        Namespace of the robot, such as ``/robot_1``; None takes the only one.
+    remaps : mapping or None
+        Topic of the bag, by its name in ros_pad: ``{'leg_1/wrench': '/ft'}``, or, for all legs,
+        ``{'leg_{leg}/wrench': '/foot_{leg}/ft'}``. As in ROS, a topic that does not begin with a
+        slash is in the namespace.
     progress : callable or None
         Called now and then with the share that is done, 0 to 1.
-
-    Returns
-    -------
-    legs : tuple of int
-    records : Records
-        In the order of their stamps.
-    log_times : dict of array
-        Log time of each of them, ns, by kind.
-    tables : dict of Table
-        What was recorded of the poses of the body, :data:`POSES`.
 
     Raises
     ------
     BagError
-        When a message cannot be read, or records of two kinds have other legs.
+        When there is no topic of a leg or several robots, when a topic has another message type
+        than in ros_pad, or when a message cannot be read.
+    InvalidInput
+        When a remap is of a topic that ros_pad does not have, or to one that the bag does not
+        have; when two remaps name the same topic, or only one side of a remap has ``{leg}``.
     """
-    kinds = {
-        name: each.topic.record
-        for name, each in wanted.items()
-        if each.leg is None and each.topic.record
-    }
+    wanted = _wanted(bag, namespace, remaps or {})
+    kinds = {n: topic.record for n, (topic, leg) in wanted.items() if leg is None and topic.record}
     paths = {
-        name: (*(STAMP if each.topic.frame else ()), *each.topic.values)
-        for name, each in wanted.items()
-        if each.topic.columns or each.topic in POSES
+        name: (*(STAMP if topic.frame else ()), *topic.values)
+        for name, (topic, _) in wanted.items()
+        if topic.columns or topic in (BODY_POSE, ODOM)
     }
-    found, tables = bag.read(kinds, paths, progress)
-    blocks: dict[str, list[tuple[tuple[int, ...], np.ndarray, Block]]] = {}
-    for name, read in found.items():
-        blocks.setdefault(kinds[name].name, []).append(read)
+    records, tables = bag.read(kinds, paths, progress)
+    parts: dict[str, list[Stream]] = {kind.name: [] for kind in KINDS}
+    for name, (own, times, block) in records.items():
+        parts[kinds[name].name].append(Stream(kinds[name], own, times, block))
     for name, table in tables.items():
-        if kind := wanted[name].topic.record:
-            blocks.setdefault(kind.name, []).append(_of_leg(wanted[name], *table, ambient))
-    legs = tuple(sorted({leg for parts in blocks.values() for part in parts for leg in part[0]}))
-    joined = {kind.name: _joined(kind, legs, blocks.get(kind.name, ())) for kind in KINDS}
-    return (
+        topic, leg = wanted[name]
+        if topic.record and leg is not None:
+            parts[topic.record.name].append(_of_leg(topic, leg, table, ambient))
+    legs = tuple(sorted({leg for each in parts.values() for one in each for leg in one.legs}))
+    return Recording(
         legs,
-        Records(*(block for block, _ in joined.values())),
-        {name: times for name, (_, times) in joined.items()},
-        {wanted[name].topic: table for name, table in tables.items()},
+        {kind.name: _gathered(kind, legs, parts[kind.name]) for kind in KINDS},
+        {kind.name: name for name, kind in kinds.items()},
+        {wanted[name][0]: table for name, table in tables.items()},
     )
 
 
-def _of_leg(
-    wanted: Wanted, log_times: np.ndarray, table: np.ndarray, ambient: float
-) -> tuple[tuple[int, ...], np.ndarray, Block]:
-    """Return the records that the messages of a leg are; other fields are missing."""
-    topic, leg = wanted.topic, wanted.leg
-    assert topic.record and leg is not None
-    stamps, values = log_times, table
+def _of_leg(topic: Topic, leg: int, table: Table, ambient: float) -> Stream:
+    """Return the records that the messages of a leg are."""
+    assert topic.record
+    times, values = table
+    stamps = times
     if topic.frame:
-        stamps, values = _stamped(log_times, table)
+        stamps, times, values = _stamped(*table)
     rows = topic.record.rows(len(stamps), 1)
     numbers = rows.view('f8').reshape(len(stamps), -1)
     places = [topic.record.columns.index(column) for column in topic.columns]
     numbers[:, places] = to_record(topic, values, ambient)
-    return (leg,), np.sort(log_times) if topic.frame else log_times, Block(stamps, rows)
+    return Stream(topic.record, (leg,), times, Block(stamps, rows))
 
 
-def _joined(
-    kind: Kind, legs: tuple[int, ...], parts: Sequence[tuple[tuple[int, ...], np.ndarray, Block]]
-) -> tuple[Block, np.ndarray]:
-    """Return the records of several sources as one block with all legs, and their log times."""
-    count = sum(len(block.stamps) for _, _, block in parts)
-    rows, stamps = kind.rows(count, len(legs)), np.empty(count, np.int64)
-    times, start = np.empty(count, np.int64), 0
-    for own, log_times, block in parts:
-        place = slice(start, start + len(block.stamps))
-        columns = [legs.index(leg) for leg in own]
-        rows[place, columns], stamps[place], times[place] = block.rows, block.stamps, log_times
-        start = place.stop
+def _gathered(kind: Kind, legs: tuple[int, ...], parts: Sequence[Stream]) -> Stream:
+    """Return the records of several sources as those of all legs."""
+    rows = [kind.rows(0, len(legs))]
+    for each in parts:
+        rows.append(kind.rows(len(each.times), len(legs)))
+        rows[-1][:, [legs.index(leg) for leg in each.legs]] = each.block.rows
+    none = np.empty(0, np.int64)
+    stamps = np.concatenate([none, *(each.block.stamps for each in parts)])
+    times = np.concatenate([none, *(each.times for each in parts)])
     order = np.argsort(stamps, kind='stable')
-    return Block(stamps[order], rows[order]), times[order]
+    return Stream(kind, legs, times, Block(stamps, np.concatenate(rows))).where(order)
 
 
 def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
@@ -244,63 +247,19 @@ def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
     ]
 
 
-def _described(bag: BagReader) -> dict[str, Any]:
-    """Return the fields of a trial that follow from the custom data of a bag."""
-    about = label.read(bag)
-    settings = {
-        'ambient_pressure': about.ambient_pressure,
-        'lost': dict(json.loads(bag.custom_data.get(label.LOST, '{}'))),
-        'repaired': REPAIR in bag.custom_data,
-    }
-    return {
-        'scene': pathlib.PurePath(about.scene).stem,
-        'policy': about.policy,
-        'fidelity': about.fidelity,
-        'seed': about.seed,
-        'floor': about.floor.build(about.seed) if about.floor else None,
-        'metrics': about.metrics,
-        'settings': about.settings | settings,
-        'real_time_factor': about.real_time_factor,
-    }
-
-
-class Wanted(NamedTuple):
-    """What a topic of a bag is: a topic of ros_pad, and the number of the leg if it has one."""
-
-    topic: Topic
-    leg: int | None
-
-
-def wanted_topics(
-    bag: BagReader, namespace: str | None = None, remaps: Mapping[str, str] | None = None
-) -> dict[str, Wanted]:
-    """Return what each topic is that a trial is read from.
-
-    Where there are records, what drivers published by leg for them is left out.
-
-    Parameters
-    ----------
-    bag : BagReader
-        What was recorded.
-    namespace : str or None
-        Namespace of the robot, such as ``/robot_1``; None takes the only one.
-    remaps : mapping or None
-        Topic of the bag, by its name in ros_pad: ``{'leg_1/wrench': '/ft'}``, or, for all legs,
-        ``{'leg_{leg}/wrench': '/foot_{leg}/ft'}``. As in ROS, a topic that does not begin with a
-        slash is in the namespace.
-
-    Raises
-    ------
-    BagError
-        When there is no topic of a leg or several robots, or when a topic has another message
-        type than in ros_pad.
-    InvalidInput
-        When a remap is of a topic that ros_pad does not have, or to one that the bag does not
-        have; when two remaps name the same topic, or only one side of a remap has ``{leg}``.
-    """
-    found: dict[str, dict[str, Wanted]] = {}
-    for name, own_name in _names(bag, namespace, remaps or {}):
-        prefix, own, leg = _parsed(own_name)
+def _wanted(
+    bag: BagReader, namespace: str | None, remaps: Mapping[str, str]
+) -> dict[str, tuple[Topic, int | None]]:
+    """Return what the topics of a robot in a bag are, with the number of the leg if it has one."""
+    prefix = f'/{(namespace or "").strip("/")}/'.replace('//', '/')
+    renamed = _renamed(bag, prefix, remaps)
+    there = {*renamed, *renamed.values()}
+    names = [*renamed.items(), *((topic, topic) for topic in bag.topics if topic not in there)]
+    robots: dict[str, dict[str, tuple[Topic, int | None]]] = {}
+    for full, name in names:
+        match = re.fullmatch(r'(.*/)leg_(\d+)(/\w+)', full)
+        own = next((each for each in _KNOWN if full.endswith(f'/{each}')), '')
+        own = f'leg_{{leg}}{match[3]}' if match else own
         if own not in _KNOWN or not bag.counts[name]:
             continue
         topic = _KNOWN[own]
@@ -308,89 +267,45 @@ def wanted_topics(
             raise BagError(
                 f'{bag.path}: {name} is a {bag.topics[name]}: {topic.type_name} is needed'
             )
-        found.setdefault(prefix, {})[name] = Wanted(topic, leg)
+        robot = robots.setdefault(match[1] if match else full.removesuffix(own), {})
+        robot[name] = topic, int(match[2]) if match else None
     robots = {
-        prefix: _without_copies(topics)
-        for prefix, topics in found.items()
-        if any(each.topic.record for each in topics.values())
+        each: own for each, own in robots.items() if any(topic.record for topic, _ in own.values())
     }
+    listed = ', '.join(f'legs in {each}' for each in sorted(robots)) or 'no topics of legs'
     if namespace is not None:
-        prefix = _prefix(namespace)
-        if prefix not in robots:
-            raise BagError(
-                f'{bag.path}: no legs in namespace {prefix}; the bag has {_listed(robots)}'
-            )
-        return robots[prefix]
+        robots = {each: own for each, own in robots.items() if each == prefix}
     if len(robots) != 1:
-        raise BagError(f'{bag.path}: one robot is needed, the bag has {_listed(robots)}')
-    return next(iter(robots.values()))
-
-
-def _parsed(name: str) -> tuple[str, str, int | None]:
-    """Return the namespace of a topic, its name with ``{leg}`` for the number, and the number."""
-    if match := _OF_LEG.fullmatch(name):
-        return match['namespace'], f'leg_{{leg}}/{match["kind"]}', int(match['leg'])
-    own = next((own for own in _KNOWN if name.endswith(f'/{own}')), '')
-    return name.removesuffix(own), own, None
-
-
-def _without_copies(topics: dict[str, Wanted]) -> dict[str, Wanted]:
-    """Return topics without those of legs of which there are records."""
-    whole = {each.topic.record for each in topics.values() if each.leg is None}
+        where = '' if namespace is None else f' in namespace {prefix}'
+        raise BagError(f'{bag.path}: one robot{where} is needed, the bag has {listed}')
+    (topics,) = robots.values()
+    whole = {topic.record for topic, leg in topics.values() if leg is None}
     return {
-        name: each
-        for name, each in topics.items()
-        if each.leg is None or each.topic.record not in whole
+        name: (topic, leg)
+        for name, (topic, leg) in topics.items()
+        if leg is None or topic.record not in whole
     }
 
 
-def _prefix(namespace: str | None) -> str:
-    return f'/{(namespace or "").strip("/")}/'.replace('//', '/')
-
-
-def _names(
-    bag: BagReader, namespace: str | None, remaps: Mapping[str, str]
-) -> list[tuple[str, str]]:
-    """Return pairs of each topic of a bag and its full name in ros_pad after the remaps."""
-    prefix = _prefix(namespace)
-    renamed: dict[str, str] = {}  # topic of the bag by its name in ros_pad
-    for own, other in remaps.items():
-        given = f'--remap {own}:={other}'
-        _, known, number = _parsed(f'/{own.removeprefix("/")}'.replace('{leg}', '0'))
-        if known not in _KNOWN:
-            near = difflib.get_close_matches(own, _KNOWN, n=1)
-            hint = f' Did you mean {near[0]}?' if near else ''
-            raise InvalidInput(
-                f'{given}: {own} is no topic of ros_pad.{hint} Allowed: {", ".join(_KNOWN)}'
-            )
-        leg = '{leg}' if '{leg}' in own else str(number)
-        if (leg == '{leg}') != ('{leg}' in other):
-            raise InvalidInput(f'{given}: {{leg}} is needed on both sides of := or on neither')
+def _renamed(bag: BagReader, prefix: str, remaps: Mapping[str, str]) -> dict[str, str]:
+    """Return the topics that are remapped, by their full names in ros_pad."""
+    found: dict[str, str] = {}
+    for given, other in remaps.items():
+        words, own = f'--remap {given}:={other}', given.removeprefix('/')
+        choice(words, re.sub(r'leg_\d+/', 'leg_{leg}/', own), tuple(_KNOWN))
+        if ('{leg}' in own) != ('{leg}' in other):
+            raise InvalidInput(f'{words}: {{leg}} is needed on both sides of := or on neither')
         full = other if other.startswith('/') else prefix + other
         pattern = re.escape(full).replace(r'\{leg\}', r'(?P<leg>\d+)', 1)
         pattern = pattern.replace(r'\{leg\}', '(?P=leg)')
         matches = [match for topic in bag.topics if (match := re.fullmatch(pattern, topic))]
         if not matches:
-            near = difflib.get_close_matches(full, bag.topics, n=3, cutoff=0.0)
-            raise InvalidInput(
-                f'{given}: {bag.path} has no topic {full}; similar ones are {", ".join(near)}'
-            )
+            choice(words, full, tuple(bag.topics))
         for match in matches:
-            found = match.groupdict().get('leg') or leg
-            name = own.removeprefix('/').replace('{leg}', found)
-            if renamed.setdefault(prefix + name, match[0]) != match[0]:
-                raise InvalidInput(
-                    f'{given}: another remap already takes {name} from {renamed[prefix + name]}'
-                )
-    moved = set(renamed.values())
-    return [
-        *((topic, name) for name, topic in renamed.items()),
-        *((topic, topic) for topic in bag.topics if topic not in moved | set(renamed)),
-    ]
-
-
-def _listed(robots: Iterable[str]) -> str:
-    return ', '.join(f'legs in {prefix}' for prefix in sorted(robots)) or 'no topics of legs'
+            name = prefix + own.replace('{leg}', match.groupdict().get('leg', ''))
+            if found.setdefault(name, match[0]) != match[0]:
+                raise InvalidInput(f'{words}: another remap already takes {name}')
+    return found
 
 
 __all__ = ['load']

@@ -13,25 +13,30 @@ from __future__ import annotations
 import json
 import math
 import os
-import pathlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_pad.bags import BagReader
-from ros_pad.errors import BagError
-from ros_pad.estimation.load_gate import CONTACT_SHARE
-from ros_pad.pace import Progress, part
+from ros_pad.control.stage import DecisionStage
+from ros_pad.errors import BagError, InvalidInput
+from ros_pad.estimation.stage import EstimationStage
+from ros_pad.joining import Joiner
+from ros_pad.pace import TICK_PERIOD_NS, Pace, Progress, part
+from ros_pad.pipeline import Pipeline
+from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind
 from ros_pad.trials.comparison import Comparison, Stream, Track, compare
 from ros_pad.trials.label import CHANGES
 from ros_pad.trials.node_settings import NodeSettings
-from ros_pad.trials.recorded import wanted_topics
+from ros_pad.trials.recorded import Recording, read
 from ros_pad.trials.replay_body import compare_body
-from ros_pad.trials.replay_inputs import Inputs, read
-from ros_pad.trials.replay_player import Player
 from ros_pad.trials.trial import BOUNCE
+
+LONGER = 1.6
+"""A time between two messages that is longer than their median time by this factor is a gap."""
 
 Tracks = dict[tuple[int, str], Track]
 
@@ -118,10 +123,8 @@ class Replay:
         See :attr:`Comparison.verdict`.
         """
         verdicts = {each.verdict for each in self.comparisons if each.compared + each.missing}
-        for worst in ('different', 'gap', 'rounding', 'equal'):
-            if worst in verdicts:
-                return worst
-        return 'nothing'
+        worst = ('different', 'gap', 'rounding', 'equal')
+        return next((each for each in worst if each in verdicts), 'nothing')
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON, without the tracks.
@@ -131,32 +134,27 @@ class Replay:
         dict
             Verdict, settings, counts and comparisons, by name.
         """
-        settings = self.settings
+        foot, policy = self.settings.foot.source, self.settings.policy
+        comparisons = [asdict(each) for each in self.comparisons]
+        for each in comparisons:
+            if each['largest_difference'] == math.inf:  # JSON has no infinity
+                each['largest_difference'] = None
         return {
             'bag': self.bag,
             'verdict': self.verdict,
             'legs': list(self.legs),
             'duration_s': self.duration_s,
-            'settings': {
-                'foot': settings.foot.source,
-                'policy': settings.policy,
-                **settings.as_dict(),
-            },
+            'settings': {'foot': foot, 'policy': policy, **self.settings.as_dict()},
             'samples': self.samples,
             'refused': {leg: count for leg, (count, _) in self.refused.items()},
-            'comparisons': [_plain(asdict(each)) for each in self.comparisons],
+            'comparisons': comparisons,
             'outcomes': [asdict(each) for each in self.outcomes],
             'notes': self.notes,
         }
 
 
-def _plain(values: dict[str, Any]) -> dict[str, Any]:
-    # JSON has no infinity.
-    return {n: None if value == math.inf else value for n, value in values.items()}
-
-
 def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> BagReader:
-    """Open a bag; for an SQLite bag, the error message has the command that converts it.
+    """Open a bag.
 
     Parameters
     ----------
@@ -173,16 +171,8 @@ def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> 
     Raises
     ------
     BagError
-        When :class:`ros_pad.bags.BagReader` raises it, and for an SQLite bag (``.db3``).
+        When :class:`ros_pad.bags.BagReader` raises it.
     """
-    path = pathlib.Path(path)
-    if path.suffix == '.db3' or (path.is_dir() and list(path.glob('*.db3*'))):
-        bag = path.parent if path.suffix == '.db3' else path
-        raise BagError(
-            f'{path} is an SQLite bag (.db3), and only MCAP can be read. Convert it:'
-            f' ros2 bag convert -i {bag} -o mcap.yaml, where mcap.yaml has'
-            f" 'output_bags: [{{uri: {bag}_mcap, storage_id: mcap, all: true}}]'"
-        )
     return BagReader(path, progress)
 
 
@@ -220,20 +210,30 @@ def replay(
         When there is no wrench of any leg, a topic has another message type than in ros_pad, or
         the bag has several robots and no namespace is given.
     InvalidInput
-        When a remap is not allowed, see :func:`ros_pad.trials.recorded.wanted_topics`.
+        When a remap is not allowed, see :func:`ros_pad.trials.recorded.read`.
     """
     settings = settings or NodeSettings.of(bag)
-    wanted = wanted_topics(bag, namespace, remaps)
-    inputs = read(bag, wanted, settings, part(progress, 0.0, 0.2))
-    player = Player(settings, inputs)
+    recording = read(
+        bag, settings.values['ambient_pressure'], namespace, remaps, part(progress, 0.0, 0.2)
+    )
+    inputs = _inputs(bag, recording, settings)
+    player = _Player(settings, inputs)
     made = player.play(part(progress, 0.2, 0.9))
-    comparisons = _compared(bag, inputs, made)
+    comparisons = [
+        found
+        for kind in made
+        if kind in recording.topics
+        for found in compare(
+            recording.topics[kind], inputs.streams[kind], made[kind], bag.start, inputs.gap_ns
+        )
+    ]
+    gaps = inputs.gaps if any(each.verdict == 'gap' for each in comparisons) else []
     # The body estimator is replayed beside the feet, which take what it published.
-    of_body, note = compare_body(bag, wanted)
-    tracks = [
+    of_body, note = compare_body(bag, recording.topics.get(SAMPLE.name, ''))
+    recorded, replayed = (
         {key: track for kind in made for key, track in streams[kind].tracks().items()}
         for streams in (inputs.streams, made)
-    ]
+    )
     if progress:
         progress(1.0)
     return Replay(
@@ -244,102 +244,307 @@ def replay(
         duration_s=(bag.end - bag.start) * 1e-9,
         samples=dict(zip(inputs.legs, player.stages.estimation.used.tolist(), strict=True)),
         refused=player.refused,
-        recorded=tracks[0],
-        replayed=tracks[1],
+        recorded=recorded,
+        replayed=replayed,
         streams=made,
         comparisons=comparisons + of_body,
-        outcomes=[_outcome(inputs, settings, leg, *tracks) for leg in inputs.legs],
+        outcomes=list(_outcomes(inputs, settings, recorded, replayed)),
         notes=[
-            *settings.assumed,
-            *_notes(bag, inputs, player.refused, comparisons),
-            *([note] if note else []),
+            *settings.assumed, *_changes(bag), *inputs.lacks, *gaps,
+            *(f'leg {leg}: {count} samples rejected, the last one: {reason}'
+              for leg, (count, reason) in player.refused.items()),
+            *filter(None, (bag.problem, inputs.late, note)),
         ],
-    )
+    )  # fmt: skip
 
 
-def _compared(bag: BagReader, inputs: Inputs, made: Mapping[str, Stream]) -> list[Comparison]:
-    """Compare what was recorded as records with what was made again."""
-    # What was lost may have changed all legs: they share what feet learn, and one controller.
-    gap_ns = min((gap.time_ns for gap in inputs.gaps), default=math.inf)
-    if inputs.lacks:
-        gap_ns = -math.inf
-    there = [kind for kind in made if kind in inputs.topics]
-    return [
-        found
-        for kind in there
-        for found in compare(
-            inputs.topics[kind], inputs.streams[kind], made[kind], bag.start, gap_ns
-        )
-    ]
-
-
-def _notes(
-    bag: BagReader,
-    inputs: Inputs,
-    refused: Mapping[int, tuple[int, str]],
-    comparisons: Sequence[Comparison],
-) -> Iterator[str]:
-    """Yield notes on a replay, one sentence each."""
-    if bag.problem:
-        yield bag.problem
+def _changes(bag: BagReader) -> Iterator[str]:
+    """Yield notes on parameters that were changed while recording."""
     for time_ns, node, name, value in json.loads(bag.custom_data.get(CHANGES, '[]')):
         yield (
             f'{(time_ns - bag.start) * 1e-9:.2f} s: parameter {name} of {node} became {value!r};'
             ' the replay keeps the first value'
         )
-    yield from inputs.lacks
-    for gap in sorted(inputs.gaps) if any(each.verdict == 'gap' for each in comparisons) else ():
-        yield (
-            f'{gap.what}: {gap.places} gap{"s" if gap.places > 1 else ""}, the first'
-            f' {(gap.time_ns - bag.start) * 1e-9:.3f} s after the beginning: what was not recorded'
-            ' cannot be replayed'
+
+
+def _outcomes(
+    inputs: _Inputs, settings: NodeSettings, recorded: Tracks, replayed: Tracks
+) -> Iterator[Outcome]:
+    values = settings.values
+    gate = values['load_gate'] * values['expected_load']
+    delay_ns = round(2e9 / values['publish_rate'])  # until the estimate of a stance is there
+    for place, leg in enumerate(inputs.legs):
+        ends = _stance_ends(inputs, place, gate) + delay_ns
+        wet, slips, switches = [], [], []
+        for tracks in (recorded, replayed):
+            wetness, slipping, shape = (
+                tracks[leg, name] for name in ('wetness', 'slipping', 'morphology')
+            )
+            wet.append(sum(wetness.at(end) > 0.5 for end in ends.tolist()))
+            slips.append(int(np.sum(np.diff(slipping.values[:, 0] == 1.0, prepend=0) > 0)))
+            switches.append(int(np.sum(np.diff(shape.values[:, 0]) != 0.0)))
+        there = [len(recorded[leg, name].times) > 0 for name in ('wetness', 'morphology')]
+        yield Outcome(
+            leg,
+            len(ends),
+            (wet[0] if there[0] else None, wet[1]),
+            (slips[0] if there[0] else None, slips[1]),
+            (switches[0] if there[1] else None, switches[1]),
         )
-    for leg, (count, reason) in refused.items():
-        yield f'leg {leg}: {count} samples rejected, the last one: {reason}'
-    different = [each for each in comparisons if each.verdict == 'different']
-    if different and not any(each.equal for each in different):
-        yield (
-            'the quantities that differ have no equal record: the nodes had other settings, or the'
-            ' bag begins in the middle of a walk'
-        )
-    if inputs.late:
-        yield inputs.late
 
 
-def _outcome(
-    inputs: Inputs, settings: NodeSettings, leg: int, recorded: Tracks, replayed: Tracks
-) -> Outcome:
-    ends = _stance_ends(inputs, leg, CONTACT_SHARE * settings.expected_load)
-    # After this delay the estimate of the stance is there; it is constant in the air.
-    delay_ns = round(2e9 / settings.publish_rate)
-
-    def pair(name: str, count: Callable[[Track], int]) -> tuple[int | None, int]:
-        track = recorded[leg, name]
-        return count(track) if len(track.times) else None, count(replayed[leg, name])
-
-    return Outcome(
-        leg=leg,
-        stance_ends=len(ends),
-        wet_ends=pair(
-            'wetness', lambda track: sum(track.at(end + delay_ns) > 0.5 for end in ends.tolist())
-        ),
-        slips=pair(
-            'slipping',
-            lambda track: int(np.sum(np.diff(track.values[:, 0] == 1.0, prepend=0) > 0)),
-        ),
-        switches=pair('morphology', lambda track: int(np.sum(np.diff(track.values[:, 0]) != 0.0))),
-    )
-
-
-def _stance_ends(inputs: Inputs, leg: int, load: float) -> np.ndarray:
+def _stance_ends(inputs: _Inputs, place: int, load: float) -> np.ndarray:
     """Return the stamps at which a leg lifts off, ns; a bounce is no lift-off."""
     stamps, rows = inputs.streams['sample'].block
-    force = rows['force'][:, inputs.legs.index(leg), 2]
+    force = rows['force'][:, place, 2]
     stamps, force = stamps[np.isfinite(force)], force[np.isfinite(force)]
     step = np.diff((force >= load).astype(int))
     ends, landings = stamps[1:][step < 0], stamps[1:][step > 0]
     last = np.append(landings, np.iinfo(np.int64).max)
     return ends[last[np.searchsorted(landings, ends)] - ends >= BOUNCE * 1e9]
+
+
+# --- what was recorded --------------------------------------------------------------------------
+
+
+class _Inputs(NamedTuple):
+    """What is replayed.
+
+    Attributes
+    ----------
+    legs : tuple of int
+        Legs that can be replayed.
+    streams : dict of Stream
+        Records by name of their kind, of these legs.
+    gap_ns : float
+        Log time of the first gap, ns, from which on differences are excused.
+    gaps, lacks : list of str
+        Notes on gaps, and on what was not recorded at all.
+    late : str
+        Note on samples that are left out because the estimator started later; empty if none are.
+    """
+
+    legs: tuple[int, ...]
+    streams: dict[str, Stream]
+    gap_ns: float
+    gaps: list[str]
+    lacks: list[str]
+    late: str
+
+
+def _inputs(bag: BagReader, recording: Recording, settings: NodeSettings) -> _Inputs:
+    """Return what is replayed; what drivers published by leg is joined into records."""
+    known, joined = recording.legs, SAMPLE.name in recording.topics
+    felt = np.isfinite(recording.streams['sample'].values('force')[..., 2]).any(axis=0)
+    there = {leg for leg, own in zip(known, felt, strict=True) if own or joined}
+    if not there or not len(felt) or not len(recording.streams['sample'].times):
+        raise BagError(
+            f'{bag.path}: no wrench of a leg was recorded; the topics are'
+            f' {", ".join(sorted(bag.topics))}. If one has wrenches, name it with a remap'
+        )
+    # Keep the order of the legs in the controller of the bag, around the body.
+    legs = (*(leg for leg in settings.legs if leg in there), *sorted(there - {*settings.legs}))
+    places = [known.index(leg) for leg in legs]
+    streams = {
+        name: each._replace(legs=legs, block=Block(each.block.stamps, each.block.rows[:, places]))
+        for name, each in recording.streams.items()
+    }
+    needed: tuple[str, ...] = ('force', 'position')
+    if settings.tuning.source == 'joints':
+        needed = ('force', 'position', 'velocity')
+    gaps = [
+        *_gaps(streams['sample'], () if joined else needed),
+        *_gaps(streams['pressure'], () if 'pressure' in recording.topics else ('pressure',)),
+    ]
+    if not joined:
+        streams['sample'] = _joined(streams['sample'], needed)
+    late = _leave_out(streams)
+    gaps = sorted(gap for gap in gaps if gap[0] >= streams['sample'].times[0])
+    lacks = _lacks(streams, legs, sorted({*known, *settings.legs} - there), needed)
+    notes = [
+        f'{what}: {count} gap{"s" if count > 1 else ""}, the first'
+        f' {(time_ns - bag.start) * 1e-9:.3f} s after the beginning: what was not recorded cannot'
+        ' be replayed'
+        for time_ns, what, count in gaps
+    ]
+    # What was lost may have changed all legs: they share what feet learn, and one controller.
+    gap_ns = -math.inf if lacks else min((float(gap[0]) for gap in gaps), default=math.inf)
+    return _Inputs(legs, streams, gap_ns, notes, lacks, late)
+
+
+def _leave_out(streams: dict[str, Stream]) -> str:
+    """Leave out what no replay can have; return a note on samples among it."""
+    samples = streams['sample']
+    stamps, (made, rows) = samples.block.stamps, streams['estimate'].block
+    wide = _wide(stamps)
+    for name in ('estimate', 'command'):
+        # Between samples, nodes tell of silent feet, with stamps that no replay has.
+        own = streams[name].block.stamps
+        there = np.isin(np.searchsorted(stamps, own) - 1, wide) | np.isin(own, stamps)
+        streams[name] = streams[name].where(there)
+    # An estimator makes its first estimate of its first sample.
+    begun = np.isin(made, stamps) | np.isfinite(rows['load']).any(axis=1)
+    kept = stamps >= made[begun].min(initial=np.iinfo(np.int64).max)
+    if kept.all() or not kept.any():  # none, where there are no estimates
+        return ''
+    streams['sample'] = samples.where(kept)
+    return (
+        'the estimator started later than the recorder, so the replay leaves out the'
+        f' {int(np.sum(~kept))} samples before its first recorded estimate'
+    )
+
+
+def _joined(pieces: Stream, needed: tuple[str, ...]) -> Stream:
+    """Return records of all legs, with the log time of the last piece of each."""
+    kind, legs, times, (stamps, rows) = pieces.where(np.argsort(pieces.times, kind='stable'))
+    joiner, found, time_ns = Joiner(kind, legs, needed), [], 0
+    numbers = rows.view('f8').reshape(*rows.shape, -1)
+    for time_ns, stamp_ns, each in zip(times.tolist(), stamps.tolist(), numbers, strict=True):
+        for row in np.flatnonzero(~np.isnan(each).all(axis=1)).tolist():
+            values = dict(zip(kind.columns, each[row].tolist(), strict=True))
+            values = {name: value for name, value in values.items() if not math.isnan(value)}
+            found += [(time_ns, block) for block in joiner.add(legs[row], stamp_ns, values)]
+    found += [(time_ns, block) for block in joiner.expire(math.inf)]
+    return Stream.of(kind, legs, found)
+
+
+def _gaps(stream: Stream, fields: Sequence[str]) -> Iterator[tuple[int, str, int]]:
+    """Yield gaps of records or, where drivers published by leg, of each of these fields and leg.
+
+    These are the log time of the first one, ns, what has gaps, and their number.
+    """
+    sources = {} if fields else {stream.kind.name: np.full(len(stream.times), True)}
+    for name in fields:
+        own = ~np.isnan(stream.values(name)).all(axis=2)
+        sources |= {f'{name} of leg {leg}': own[:, i] for i, leg in enumerate(stream.legs)}
+    for what, there in sources.items():
+        if len(wide := _wide(stream.block.stamps[there])):
+            yield int(stream.times[there][wide[0]]), what, len(wide)
+
+
+def _wide(stamps: np.ndarray) -> np.ndarray:
+    """Return the places of the records after which there is a gap."""
+    steps = np.diff(stamps)
+    return np.flatnonzero(steps > LONGER * max(np.median(steps), 0.0)) if len(steps) else steps
+
+
+def _lacks(
+    streams: Mapping[str, Stream], legs: tuple[int, ...], absent: list[int], needed: Sequence[str]
+) -> list[str]:
+    """Return notes on legs of which something was not recorded at all, one sentence each."""
+    found = [(absent, 'wrench', 'the decisions for other legs lack its footprints')]
+    for name in (*needed[1:], 'pressure'):
+        kind = 'pressure' if name == 'pressure' else 'sample'
+        known = np.isfinite(streams[kind].values(name)).any(axis=(0, 2))
+        lack = [leg for leg, own in zip(legs, known, strict=True) if not own]
+        so = 'its pads are assumed to be flat' if name == 'pressure' else 'there are no estimates'
+        found.append((lack, name, so))
+    return [
+        f'leg {", ".join(map(str, lack))}: no {name} was recorded, so {so}'
+        for lack, name, so in found
+        if lack
+    ]
+
+
+# --- passing it on ------------------------------------------------------------------------------
+
+
+class _Player:
+    """Pass the inputs of a robot to the stages of estimation and decision, once.
+
+    Nodes process the samples up to a moment together, and then receive the pressures of this
+    moment. Both stages look for missing inputs before that.
+
+    Attributes
+    ----------
+    stages : Pipeline
+    refused : dict
+        Number of rejected samples and estimates, and the reason of the last one, by leg.
+    """
+
+    def __init__(self, settings: NodeSettings, inputs: _Inputs) -> None:
+        self._inputs, legs = inputs, inputs.legs
+        self.refused: dict[int, tuple[int, str]] = {}
+        period_ns = round(1e9 / settings.values['publish_rate'])
+        self.stages = Pipeline(
+            EstimationStage(
+                settings.foot, settings.values['expected_load'], settings.tuning, legs, period_ns,
+                self._reject,
+            ),
+            DecisionStage(settings.controller(legs), legs, self._reject),
+        )  # fmt: skip
+        stamps, rows = inputs.streams[COMMAND.name].block
+        self._setpoints = dict(zip(stamps.tolist(), rows['setpoint'], strict=True))  # recorded
+        # Whether the set-point of each leg differs from the recorded one.
+        self._apart = np.full(len(legs), not self._setpoints)
+        self._pace = Pace(TICK_PERIOD_NS)
+
+    def play(self, progress: Progress | None) -> dict[str, Stream]:
+        """Play everything; return estimates and commands by name of their kind."""
+        made: dict[Kind, list[tuple[int, Block]]] = {ESTIMATE: [], COMMAND: []}
+        samples, pressures = (self._inputs.streams[name] for name in ('sample', 'pressure'))
+        stamps, rows = samples.block
+        done = 0
+        for start, end, until in _blocks(samples.times, pressures.times):
+            for at_ns, each in zip(*(each[done:until] for each in pressures.block), strict=True):
+                self._press(int(at_ns), each)
+            done = until
+            self._tick(int(stamps[end - 1]))
+            time_ns = int(samples.times[end - 1])
+            block = Block(stamps[start:end], rows[start:end])
+            for estimate, command in self.stages.process(block):
+                made[ESTIMATE].append((time_ns, estimate))
+                made[COMMAND].append((time_ns, command))
+                self._follow(command)
+            if progress:
+                progress(end / len(stamps))
+        legs = self._inputs.legs
+        return {kind.name: Stream.of(kind, legs, each) for kind, each in made.items()}
+
+    def _press(self, stamp_ns: int, rows: np.ndarray) -> None:
+        """Process a pressure record."""
+        self._tick(stamp_ns)
+        self.stages.estimation.pressure(rows)
+        own = rows.copy()
+        own['pressure'][self._apart] = math.nan
+        self.stages.decision.pressure(Block.of(stamp_ns, own))
+
+    def _tick(self, now_ns: int) -> None:
+        if self._pace.due(now_ns):
+            self.stages.tick(now_ns)
+
+    def _follow(self, command: Block) -> None:
+        """Let the pressure be the set-point while the set-point differs from the recorded one.
+
+        The recorded pressure follows the recorded set-points: with this pressure, the controller
+        would report the pad as stuck.
+        """
+        setpoints = command.rows[-1]['setpoint']
+        recorded = self._setpoints.get(command.last_ns)
+        if recorded is not None:
+            same = (setpoints == recorded) | (np.isnan(setpoints) & np.isnan(recorded))
+            self._apart = ~same
+        if self._apart.any():
+            rows = PRESSURE.rows(len(setpoints))
+            rows['pressure'] = np.where(self._apart, setpoints, math.nan)
+            self.stages.decision.pressure(Block.of(command.last_ns, rows))
+
+    def _reject(self, leg: int, error: InvalidInput) -> None:
+        self.refused[leg] = self.refused.get(leg, (0, ''))[0] + 1, str(error)
+
+
+def _blocks(samples: np.ndarray, pressures: np.ndarray) -> Iterator[tuple[int, int, int]]:
+    """Yield the samples between two pressures: first, end, and the number of pressures before.
+
+    Pressures count for samples with later log times, ns. Samples of more than a tick are divided.
+    """
+    # Records are in the order of their stamps, even if their log times are not.
+    samples, pressures = np.maximum.accumulate(samples), np.maximum.accumulate(pressures)
+    before = np.searchsorted(pressures, samples, side='left')
+    ticks = (samples - samples[np.searchsorted(before, before)]) // TICK_PERIOD_NS
+    cuts = np.flatnonzero(np.diff(before) | np.diff(ticks)) + 1
+    for start, end in pairwise([0, *cuts.tolist(), len(samples)]):
+        yield start, end, int(before[start])
 
 
 __all__ = ['Outcome', 'Replay', 'open_bag', 'replay']

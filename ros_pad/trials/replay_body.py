@@ -7,7 +7,7 @@ import heapq
 import json
 import math
 import operator
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,20 +15,17 @@ import numpy as np
 from ros_pad.bags import BagReader
 from ros_pad.bags.fields import field_of
 from ros_pad.bags.topics import FORCE, IMU, JOINT_STATES, ODOM, SAMPLE, STAMP
-from ros_pad.errors import BagError, ConfigError, InvalidInput, reason
+from ros_pad.errors import ConfigError, InvalidInput, reason
 from ros_pad.records import SAMPLE as SAMPLES
 from ros_pad.records import Block, Field, Kind
-from ros_pad.robots import Robot
-from ros_pad.sensing import BodyEstimate, BodyEstimator, SensingStage
+from ros_pad.sensing import BodyEstimate, SensingStage
 from ros_pad.sensing.stage import SETTINGS, JointOrder, estimator_of, robot_of, sample_of
 from ros_pad.trials.comparison import Comparison, Stream, compare
 from ros_pad.trials.label import PARAMETERS
-from ros_pad.trials.recorded import Wanted
 
 OF_BODY = -1
 """In place of the number of a leg, for the pose of the body."""
 
-_NAMES = {each.name for each in SETTINGS}
 _POSE = Kind(
     'odom',
     'Estimated pose of the body.',
@@ -36,15 +33,15 @@ _POSE = Kind(
 )
 
 
-def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Comparison], str]:
+def compare_body(bag: BagReader, sample: str) -> tuple[list[Comparison], str]:
     """Replay the body estimator with its recorded parameters, and compare what it published.
 
     Parameters
     ----------
     bag : BagReader
         What was recorded.
-    wanted : mapping
-        What each topic is, as :func:`ros_pad.trials.recorded.wanted_topics` returns it.
+    sample : str
+        Topic of the samples of the feet; empty if there is none.
 
     Returns
     -------
@@ -55,55 +52,36 @@ def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Com
     note : str
         Why the body estimator cannot be replayed although the bag has all of this: the file of
         the robot is not in the bag, and may be gone or changed. Else empty.
-
-    Raises
-    ------
-    BagError
-        When the recorded parameters are not valid.
     """
-    nodes = json.loads(bag.custom_data.get(PARAMETERS, '{}')).values()
-    found = [each for each in nodes if each.keys() >= _NAMES]
-    sample = next((name for name, each in wanted.items() if each.topic is SAMPLE), '')
+    names, nodes = {each.name for each in SETTINGS}, bag.custom_data.get(PARAMETERS, '{}')
+    found = [each for each in json.loads(nodes).values() if each.keys() >= names]
     prefix = sample.removesuffix(SAMPLE.name())
-    needed = [prefix + each.name() for each in (FORCE, IMU, JOINT_STATES, ODOM)]
-    if len(found) != 1 or not sample or not all(bag.counts.get(name) for name in needed):
+    inputs = [prefix + each.name() for each in (FORCE, IMU, JOINT_STATES)]
+    odom = prefix + ODOM.name()
+    if len(found) != 1 or not sample or not all(map(bag.counts.get, (*inputs, odom))):
         return [], ''
     try:
-        made_poses, made_feet = _play(bag, found[0], *needed[:3])
-    except (ConfigError, InvalidInput) as error:
-        return [], f'the body estimator is not replayed: {error}'
+        made_poses, made_feet = _play(bag, found[0], *inputs)
+    except (ConfigError, InvalidInput, KeyError) as error:
+        return [], f'the body estimator is not replayed: {reason(error)}'
     gap_ns = math.inf if bag.counts.get('/clock') else -math.inf
     feet = Stream(SAMPLES, *bag.records({sample: SAMPLES})[sample])
     # At moments without an estimate, the node sends records without values.
     feet = feet.where(np.isfinite(feet.block.rows['force']).any(axis=(1, 2)))
-    times, table = bag.tables({needed[-1]: (*STAMP, *ODOM.values)})[needed[-1]]
+    times, table = bag.tables({odom: (*STAMP, *ODOM.values)})[odom]
     stamps = table[:, :2].astype(np.int64) @ np.array([1_000_000_000, 1])
-    poses = made_poses._replace(
-        times=times, block=Block(stamps, table[:, 2:].copy().view(_POSE.dtype))
-    )
+    poses = Stream(_POSE, (OF_BODY,), times, Block(stamps, table[:, 2:].copy().view(_POSE.dtype)))
     return [
-        *compare(needed[-1], poses, made_poses, bag.start, gap_ns),
+        *compare(odom, poses, made_poses, bag.start, gap_ns),
         *compare(sample, feet, made_feet, bag.start, gap_ns),
     ], ''
-
-
-def _parts(bag: BagReader, values: Mapping[str, Any]) -> tuple[Robot, BodyEstimator]:
-    """Return the robot and the estimator that recorded parameters describe."""
-    try:
-        robot = robot_of(values)
-        return robot, estimator_of(robot, values)
-    except (KeyError, InvalidInput) as error:
-        raise BagError(
-            f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the body estimator is'
-            f' missing or not valid: {reason(error)}'
-        ) from error
 
 
 def _play(
     bag: BagReader, values: Mapping[str, Any], force: str, imu: str, joints: str
 ) -> tuple[Stream, Stream]:
     """Pass what is on these topics to a sensing stage; return its poses and samples."""
-    robot, estimator = _parts(bag, values)
+    robot = robot_of(values)
     order, wrong = JointOrder(robot), InvalidInput('no reading can be used')
     poses: list[tuple[int, Block]] = []
     feet: list[tuple[int, Block]] = []
@@ -115,24 +93,26 @@ def _play(
         feet.append((stamp_ns, Block.of(stamp_ns, sample_of(estimate))))
 
     stage = SensingStage(
-        robot, estimator, take, lambda doubt: None, lambda error: None, values['forces']
-    )
-    for _, topic, (seconds, fraction, *numbers) in _messages(bag, force, imu, joints):
-        stamp_ns = seconds * 1_000_000_000 + fraction
+        robot, estimator_of(robot, values), take, lambda doubt: None, lambda error: None,
+        values['forces'],
+    )  # fmt: skip
+    for _, topic, stamp_ns, content in _messages(bag, force, imu, joints):
         if topic == joints:
             try:
-                ordered = order(*numbers)
+                ordered = order(content.name, content.position, content.velocity, content.effort)
             except InvalidInput as error:
                 wrong = error
                 continue
             if math.isfinite(ordered[0].sum()):
                 stage.joints(stamp_ns, *ordered)
         elif topic == force:
-            for index, each in enumerate(numbers):
+            for index, each in enumerate(content):
                 if math.isfinite(each.sum()):
                     stage.force(index, stamp_ns, each)
-        elif math.isfinite(sum(numbers)):
-            stage.imu(stamp_ns, numbers[:3], numbers[3:])
+        else:
+            numbers = [field_of(content, path) for path in IMU.values]
+            if math.isfinite(sum(numbers)):
+                stage.imu(stamp_ns, numbers[:3], numbers[3:])
     if not stage.samples:
         raise wrong
     legs = tuple(values['legs'])
@@ -141,28 +121,15 @@ def _play(
 
 def _messages(
     bag: BagReader, force: str, imu: str, joints: str
-) -> Iterator[tuple[int, str, Iterable[Any]]]:
-    """Yield log time, ns, topic and values of all messages, which begin with the stamp."""
-
-    def values(topic: str, message: Any) -> Iterator[Any]:
-        """Yield the values of a message, beginning with its stamp."""
-        yield from (message.header.stamp.sec, message.header.stamp.nanosec)
-        if topic == joints:
-            yield from (message.name, message.position, message.velocity, message.effort)
-        else:
-            yield from (field_of(message, path) for path in IMU.values)
-
+) -> Iterator[tuple[int, str, int, Any]]:
+    """Yield log time, ns, topic, stamp, ns, and message, or forces, in the order of recording."""
     messages = (
-        (log_ns, topic, values(topic, message))
+        (log_ns, topic, message.header.stamp.sec * 10**9 + message.header.stamp.nanosec, message)
         for topic, message, log_ns in bag.messages({imu, joints})
     )
     _, times, (stamps, rows) = bag.records({force: SAMPLES})[force]
-    forces = (
-        (log_ns, force, (0, stamp_ns, *each))
-        for log_ns, stamp_ns, each in zip(
-            times.tolist(), stamps.tolist(), rows['force'], strict=True
-        )
-    )
+    each = zip(times.tolist(), stamps.tolist(), rows['force'], strict=True)
+    forces = ((log_ns, force, stamp_ns, own) for log_ns, stamp_ns, own in each)
     # Forces come first: readings of the joints wait for those of the same moment.
     return heapq.merge(forces, messages, key=operator.itemgetter(0))
 

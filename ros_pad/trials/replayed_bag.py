@@ -1,14 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the records of a replay into a new bag, to be shown beside the recorded one.
-
-This needs no ROS except for the definition of the message type.
-"""
+"""Write the records of a replay into a new bag, to be shown beside the recorded one."""
 
 from __future__ import annotations
 
-import heapq
 import json
-import operator
 import os
 from collections.abc import Iterator
 
@@ -19,8 +14,6 @@ from ros_pad.records import Block
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.label import KEY
 from ros_pad.trials.replay import Replay
-
-_REPORT_EVERY = 100  # messages
 
 
 def write(
@@ -47,38 +40,36 @@ def write(
     BagError
         When the folder exists or cannot be written, or the message type is not installed.
     """
-    settings = replay.settings
+    known = replay.as_dict()['settings']
     about = {
-        'scene': settings.scene,
-        'seed': settings.seed,
-        'policy': settings.policy,
-        'ambient_pressure': settings.ambient_pressure,
+        'policy': known['policy'],
+        'ambient_pressure': known['ambient_pressure'],
         'settings': {
-            'foot': settings.foot.source,
-            'expected_load': settings.expected_load,
+            'foot': known['foot'],
+            'expected_load': known['expected_load'],
             'replay_of': replay.bag,
-            'replayed_with': replay.as_dict()['settings'],
+            'replayed_with': known,
         },
     }
-    prefix = f'/{(namespace or "").strip("/")}/'.replace('//', '/')
-    streams = [_messages(each, prefix) for each in replay.streams.values()]
-    total = sum(len(each.times) for each in replay.streams.values())
+    prefix = f'/{(namespace or "").strip("/")}/feet/'.replace('//', '/')
+    messages = sorted(
+        message for stream in replay.streams.values() for message in _messages(stream, prefix)
+    )
     with BagWriter(folder, {KEY: json.dumps(about)}) as bag:
         for kind in replay.streams:
-            bag.add_topic(f'{prefix}feet/{kind}', TYPE)
-        merged = heapq.merge(*streams, key=operator.itemgetter(0))
-        for done, (time_ns, name, data) in enumerate(merged, 1):
+            bag.add_topic(prefix + kind, TYPE)
+        for done, (time_ns, name, data) in enumerate(messages, 1):
             bag.write(name, data, time_ns)
-            if progress and (done % _REPORT_EVERY == 0 or done == total):
-                progress(done / total)
+            if progress and (done % 100 == 0 or done == len(messages)):
+                progress(done / len(messages))
 
 
 def _messages(stream: Stream, prefix: str) -> Iterator[tuple[int, str, bytes]]:
     """Yield log time, ns, topic and bytes of each record."""
-    encode, name = Wire(stream.kind, stream.legs).encode, f'{prefix}feet/{stream.kind.name}'
+    encode, (stamps, rows) = Wire(stream.kind, stream.legs).encode, stream.block
     for row, time_ns in enumerate(stream.times.tolist()):
-        stamps, rows = stream.block
-        yield time_ns, name, encode(Block(stamps[row : row + 1], rows[row : row + 1]))
+        each = Block(stamps[row : row + 1], rows[row : row + 1])
+        yield time_ns, prefix + stream.kind.name, encode(each)
 
 
 __all__ = ['write']

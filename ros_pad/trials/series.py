@@ -58,13 +58,12 @@ def held(stamps: np.ndarray, values: np.ndarray, grid: np.ndarray) -> np.ndarray
     return np.take_along_axis(np.concatenate([first, values]), rows, axis=0)
 
 
-def series(records: Records) -> dict[str, Any]:
+def series(sample: Block, estimate: Block, command: Block, pressure: Block) -> dict[str, Any]:
     """Return the series of :class:`ros_pad.trials.trial.Trial` by name, times in ns.
 
     Fast series have a row for each sample of any foot; slow ones for each estimate with a sample,
     without loads for each wetness, and without that for each pressure.
     """
-    sample, estimate, command, pressure = records
     fast = sample.stamps[np.isfinite(sample.rows['force']).all(axis=2).any(axis=1)]
     grids = (estimate.stamps[np.isfinite(estimate.rows[name]).any(axis=1)]
              for name in ('load', 'wetness'))  # fmt: skip

@@ -71,16 +71,13 @@ def on_floor(seed: int, fidelity: str, cycles: int) -> dict[str, list[float]]:
 
 def table(document: dict[str, Any]) -> str:
     """Return the distances as text: means over floors, and each floor."""
-    heads = ''.join(f'{head:>18}' for head in COLUMNS)
-    lines = [
-        f'{document["fidelity"]}, {document["cycles"]} cycles, mm a cycle',
-        f'{"fault":28}{heads}   floors {document["seeds"]}',
-    ]
-    for name, floors in document['faults'].items():
-        means = ''.join(f'{mean:18.1f}' for mean in np.mean(floors, axis=0))
-        apart = ' '.join('/'.join(f'{each:.0f}' for each in floor) for floor in floors)
-        lines.append(f'{name:28}{means}   {apart}')
-    return '\n'.join(lines)
+    rows = [
+        {'fault': name, **dict(zip(COLUMNS, np.mean(floors, axis=0).tolist(), strict=True)),
+         'floors': floors}
+        for name, floors in document['faults'].items()
+    ]  # fmt: skip
+    title = f'{document["fidelity"]}, {document["cycles"]} cycles, mm a cycle'
+    return command.listed(rows, title)
 
 
 def main(words: Sequence[str]) -> int:

@@ -226,82 +226,45 @@ def judged(stored: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, 
 
 def text_of(config: dict[str, Any], scenes: dict[str, int]) -> str:
     """Return the text of fidelity.yaml."""
-    lines = [
-        '# Made by python -m studies fidelity. Bound of the error of a level and metric: exp of',
-        '# constant + slopes times features, less 1e-4; at least 1e-4. The promise: the error of',
-        '# 95 of 100 scenes drawn in these ranges is within it.',
-        f'machine: {{{", ".join(f"{key}: {value!r}" for key, value in machine().items())}}}',
-        f'scenes: {{{", ".join(f"{key}: {value}" for key, value in scenes.items())}}}'
-        '  # for fit and calibration',
-        'robots:',
-    ]
+    robots: dict[str, Any] = {}
     for robot, parts in config.items():
-        lines.append(f'  {robot}:')
-        for part, values in parts.items():
-            lines.append(f'    {part}:')
-            for name, row in values.items():
-                if isinstance(row, dict):
-                    slopes = ', '.join(f'{key}: {value:.5g}' for key, value in row.items())
-                    lines.append(f'      {name}: {{{slopes}}}')
-                else:
-                    lines.append(f'      {name}: [{", ".join(map(_number, row))}]')
-    return '\n'.join(lines) + '\n'
-
-
-def _number(value: float) -> str:
-    """Return a number as YAML reads it: with a point before its exponent."""
-    text = repr(float(value))
-    return text if '.' in text else text.replace('e', '.0e')
+        slopes = {
+            name: {key: float(f'{value:.5g}') for key, value in line.items()}
+            for name, line in parts['bounds'].items()
+        }
+        spans = {
+            part: {name: list(map(float, ends)) for name, ends in parts[part].items()}
+            for part in ('ranges', 'features')
+        }
+        robots[robot] = spans | {'bounds': slopes}
+    values = {'machine': machine(), 'scenes': scenes, 'robots': robots}
+    return (
+        '# Made by python -m studies fidelity. Bound of the error of a level and metric: exp of\n'
+        '# constant + slopes times features, less 1e-4; at least 1e-4. The promise: the error of\n'
+        '# 95 of 100 scenes drawn in these ranges is within it. Scenes: of fit and calibration.'
+        f'\n{yaml.safe_dump(values, default_flow_style=None, sort_keys=False, width=1000)}'
+    )
 
 
 def summary(document: dict[str, Any]) -> str:
-    """Return shares, intervals and sharpness as tables in Markdown, the second by group."""
-    lines = [
-        '| robot, level, metric | scenes of the fit | held out | kept | 95 % interval'
-        ' | median error | median bound |',
-        '|---|---|---|---|---|---|---|',
+    """Return shares, intervals and sharpness as text, and the shares of all robots together."""
+    rows = [
+        {'robot': robot, 'level, metric': name, **row}
+        for robot, part in document['robots'].items()
+        for name, row in part['bounds'].items()
+        if row['held_out']
     ]
-    grouped = {}
-    for robot, part in document['robots'].items():
-        for name, row in part['bounds'].items():
-            if not row['held_out'] or name.startswith(FRICTION):
-                continue
-            if name.startswith('L') and name.endswith('distance'):
-                grouped[f'`{robot}` {name.removesuffix(" distance")}'] = row['groups']
-            cells = [
-                f'`{robot}` {name}',
-                str(row['scenes']),
-                str(row['held_out']),
-                _percent(row['kept']),
-                ' to '.join(map(_percent, row['interval'])),
-                _percent(row['median_error']),
-                _percent(row['median_bound']),
-            ]
-            lines.append(f'| {" | ".join(cells)} |')
     for words, levels in (('cheapest level', ('L0', 'L1')), ('L2', ('L2',))):
         for metric in LEAST_SHARES:  # a scene counts once
-            names = [f'{level} {metric}' for level in levels]
             own = [
-                part['bounds'][name]
-                for part in document['robots'].values()
-                for name in names
-                if part['bounds'].get(name, {}).get('held_out')
+                row for row in rows if row['level, metric'] in [f'{x} {metric}' for x in levels]
             ]
             kept = sum(round(row['held_out'] * row['kept']) for row in own)
             count = sum(row['held_out'] for row in own)
-            share = [_percent(each) for each in conformal.interval(kept, count)]
-            lines.append(
-                f'| all, {words} {metric} |  | {count} | {_percent(kept / count)}'
-                f' | {" to ".join(share)} |  |  |'
-            )
-    lines += ['', f'| kept, of | {" | ".join(grouped)} |', '|---' * (1 + len(grouped)) + '|']
-    for group in GROUPS:
-        cells = [
-            f'{_percent(own[group]["kept"])}, {own[group]["held_out"]}' if group in own else '–'
-            for own in grouped.values()
-        ]
-        lines.append(f'| {group} | {" | ".join(cells)} |')
-    return '\n'.join(lines)
+            share = {'held_out': count, 'kept': kept / count if count else None}
+            share['interval'] = conformal.interval(kept, count)
+            rows.append({'robot': 'all', 'level, metric': f'{words} {metric}', **share})
+    return command.listed(rows)
 
 
 def shipped() -> str:

@@ -159,40 +159,25 @@ def walks(seeds: int, processes: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _cells(values: Sequence[float | None], form: str) -> str:
-    return ' | '.join('none' if value is None else format(value, form) for value in values)
-
-
 def table(document: dict[str, Any]) -> str:
     """Return the tables of docs/model/force_limit.md."""
-    lines = [f'| pad | criterion | {" | ".join(f"{p / 1e3:g} kPa" for p in PRESSURES)} |']
-    lines.append('|' + '---|' * (2 + len(PRESSURES)))
-    for name, each in document['pads'].items():
-        for criterion, values in each['limits'].items():
-            lines.append(f'| {name} | {criterion} | {_cells(values, ".3f")} |')
-    lines += ['', '| pad | criterion | stiffness | radius | pressure |', '|---|---|---|---|---|']
-    for name, each in document['pads'].items():
-        for criterion, values in each['powers'].items():
-            lines.append(f'| {name} | {criterion} | {_cells(values, "+.1f")} |')
-    lines += ['', f'| pad | criterion | {" | ".join(f"{k:g} k" for k in STIFFER)} |']
-    lines.append('|' + '---|' * (2 + len(STIFFER)))
-    for name, each in document['pads'].items():
-        for criterion, values in each['stiffer'].items():
-            lines.append(f'| {name} | {criterion} | {_cells(values, ".3f")} |')
-    lines += ['', f'| cap, kPa of load | {" | ".join(f"{1e3 * r:g} mm" for r in RADII)} |']
-    lines.append('|' + '---|' * (1 + len(RADII)))
-    for criterion, values in document['radii'].items():
-        lines.append(f'| {criterion} | {_cells([1e-3 * v for v in values], ".1f")} |')
-    if document['walks']:
-        lines += ['', '| scene, policy | criterion | mm a cycle | domed | kPa | each walk |']
-        lines.append('|---|---|---|---|---|---|')
-    for row in document['walks']:
-        each = ', '.join(f'{mm:.1f}' for mm in row['each_mm'])
-        lines.append(
-            f'| {row["scene"]}, {row["policy"]} | {row["criterion"]} | {row["mm_a_cycle"]:.1f} |'
-            f' {row["domed"]:.2f} | {row["kpa"]:.1f} | {each} |'
-        )
-    return '\n'.join(lines)
+    lines = []
+    for part, heads in (
+        ('limits', [f'{p / 1e3:g} kPa' for p in PRESSURES]),
+        ('powers', ['stiffness', 'radius', 'pressure']),
+        ('stiffer', [f'{k:g} k' for k in STIFFER]),
+    ):
+        rows = [
+            {'pad': name, 'criterion': c, **dict(zip(heads, values, strict=True))}
+            for name, each in document['pads'].items()
+            for c, values in each[part].items()
+        ]
+        lines.append(command.listed(rows, part))
+    heads = [f'{1e3 * r:g} mm' for r in RADII]
+    radii = document['radii'].items()
+    rows = [{'criterion': c, **dict(zip(heads, values, strict=True))} for c, values in radii]
+    lines.append(command.listed(rows, 'load over area, Pa'))
+    return '\n\n'.join([*lines, command.listed(document['walks'])])
 
 
 def draw() -> Figure:
@@ -209,7 +194,7 @@ def draw() -> Figure:
             panel.plot(1e-3 * np.array([*MEASURED]), [*MEASURED.values()], 'ko', label='points')
             panel.set(title=f'Large pad as a {name}', xlabel='gauge pressure, kPa')
         stiffer = np.linspace(0.9, 3.0, 90)
-        for criterion in ('thickness', 'wall', 'flattening'):
+        for criterion in ('thickness', 'flattening'):
             forces = [limit(like(PADS['membrane'], stiffer=k), AT, criterion) for k in stiffer]
             colour = f'C{CRITERIA.index(criterion)}'
             panels[2].plot(stiffer, np.array(forces, dtype=float), color=colour)

@@ -219,30 +219,12 @@ def summary(walks: Sequence[Walk]) -> dict[str, Any]:
 
 def table(document: dict[str, Any]) -> str:
     """Return the figures as text."""
-    lines = []
-    for scene, policies in document['scenes'].items():
-        lines.append(scene)
-        for (policy, of_policy), sensing in product(policies.items(), SOURCES):
-            row = of_policy[sensing]
-            walks = ' '.join(f'{each:.2f}' for each in row['distance_m'])
-            ratio = sum(row['distance_m']) / sum(of_policy['markers']['distance_m'])
-            verdict = row['verdict_right']
-            text = (
-                f'{policy:9}{sensing:8} {walks} m ({100.0 * ratio:.1f} %), verdict right'
-                f' {"-" if verdict is None else f"{100.0 * verdict:.1f} %"} of {row["stances"]},'
-                f' slips missed {row["missed"]} of {row["slips"]},'
-                f' {row["false_alarms"]} false alarms in {row["stick_s"]:.0f} s'
-            )
-            if row['delay_s'] is not None:
-                text += f', delay {1e3 * row["delay_s"]:.0f} ms'
-            for name in ('body', 'feet'):
-                if f'{name}_rmse_m_s' in row:
-                    text += (
-                        f'; {name} {1e3 * row[f"{name}_rmse_m_s"]:.1f} mm/s a component,'
-                        f' {100.0 * row[f"{name}_coverage"]:.1f} % within 2 sd'
-                    )
-            lines.append(text + (f'; in doubt {100.0 * row["doubt"]:.1f} %' * bool(row['doubt'])))
-    return '\n'.join(lines)
+    return command.listed([
+        {'scene': scene, 'policy': policy, 'sensing': sensing, **row}
+        for scene, policies in document['scenes'].items()
+        for policy, of_policy in policies.items()
+        for sensing, row in of_policy.items()
+    ])  # fmt: skip
 
 
 def main(words: Sequence[str]) -> int:

@@ -6,7 +6,7 @@ https://ieeexplore.ieee.org/document/9981354): 13 columns at 100 Hz without a he
 z (N), moment x, y, z (N m), acceleration x, y, z without gravity (m/s²), angular rate x, y, z
 (rad/s) of one foot, and a label: 0 stable contact, 1 no contact, 2 slip. A file's name up to its
 first underscore is the robot; two robots or more are needed. Writes labelled_contacts.png and
-.json. The study turning_feet does the same for the angular rate of the simulated hexapod.
+.json.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import functools
 import json
 import math
 import pathlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,11 +52,9 @@ EDGE_TIME = 0.1
 FALSE_PER_MINUTE = 1.0
 """Allowed number of false alarms per minute of quiet samples (``Recording.quiet``)."""
 
-SHORTEST = 0.03
-"""Shortest slip that counts as an event, and shortest gap that splits one, s."""
-
-CLEAR = 0.05
-"""Distance in time from any labelled slip, s: alarms nearer than this are not false."""
+SHORTEST, CLEAR = 0.03, 0.05
+"""Shortest slip that counts as an event, and shortest gap that splits one, s; and distance in
+time from any labelled slip, s: alarms nearer than this are not false."""
 
 SAME = 0.02
 """Relative difference up to which two coefficients of friction count as equal."""
@@ -67,28 +65,20 @@ FEWEST = 10
 POINT = 1e-4
 """Yaw moment over load below which a foot counts as standing on a point, m."""
 
-RESAMPLES = 200
-PRIOR = FrictionPrior.of(Foot.load('large37'), 6.8)
 LEAST = 1e-6
 """Least value in logarithms and denominators, so that a reading of zero gives a finite value."""
 
-RATIO, TWIST = 'T/N', 'T/N with M_z'
-LIGHT, EDGE, MARGIN = 'lightly loaded', 'centre of pressure at edge', 'margin from T/N alone'
-RATE, YAW, ROLL = 'rate', 'rate about vertical', 'rate about horizontal'
-QUIETLY, LARGELY = 'rate / quiet rate', 'rate / largest rate'
-RIM, CUSUM = 'rim speed', 'CUSUM of rim speed'
-SHAKE = 'acceleration'
+RATIO, TWIST, RATE, CUSUM, SHAKE = (
+    'T/N', 'T/N with M_z', 'rate', 'CUSUM of rim speed', 'acceleration',
+)  # fmt: skip
 BOTH, CHANNELS, SHARES = 'T/N and rate', '12 channels', '12 channels / largest'
 AXES = tuple(f'{kind} {axis}' for kind in ('force', 'moment', SHAKE, 'rate') for axis in 'xyz')
 FITTED = {BOTH: (RATIO, RATE), CHANNELS: AXES, SHARES: tuple(f'{name} / largest' for name in AXES)}
 """Features that a logistic fit combines."""
 
-RANKED = (RATIO, TWIST, MARGIN, LIGHT, EDGE, ROLL, YAW, RATE, CUSUM, SHAKE, BOTH, CHANNELS)
-ALARMED = (RATIO, YAW, RATE, QUIETLY, LARGELY, RIM, CUSUM, SHAKE, BOTH, CHANNELS, SHARES)
-CALIBRATED = (RATIO, TWIST, YAW, RATE, QUIETLY, LARGELY, RIM, SHAKE, BOTH, CHANNELS, SHARES)
-FORCELESS = (ROLL, YAW, RATE, CUSUM, SHAKE)
-"""Features without force. Only these are compared between samples with T/N at the friction of the
-floor and samples below, because features with force contain this difference."""
+RANKED = (RATIO, TWIST, RATE, CUSUM, SHAKE, BOTH, CHANNELS)
+ALARMED = (RATIO, RATE, CUSUM, SHAKE, BOTH, CHANNELS, SHARES)
+CALIBRATED = (RATIO, TWIST, RATE, SHAKE, BOTH, CHANNELS, SHARES)
 
 
 # --- recordings ----------------------------------------------------------------------------------
@@ -123,7 +113,7 @@ class Recording:
         """Name of the robot."""
         return self.name.split('_')[0]
 
-    @functools.cached_property
+    @property
     def load(self) -> np.ndarray:
         """Normal force, N."""
         return self.force[:, 2]
@@ -144,14 +134,6 @@ class Recording:
         return runs(self.standing)
 
     @functools.cached_property
-    def stance(self) -> np.ndarray:
-        """Number of the stance that each sample belongs to, -1 in the air."""
-        number = np.full(len(self.label), -1)
-        for index, (start, stop) in enumerate(self.stances):
-            number[start:stop] = index
-        return number
-
-    @functools.cached_property
     def slipping(self) -> np.ndarray:
         """Whether each sample is in stance and labelled slip."""
         return self.standing & (self.label == SLIP)
@@ -161,11 +143,15 @@ class Recording:
         """Whether each sample is in stance and labelled stable."""
         return self.standing & (self.label == STABLE)
 
+    def per_load(self, value: np.ndarray) -> np.ndarray:
+        """Return a value over the normal force; zero without load."""
+        loaded = self.load > 0.0
+        return np.where(loaded, value / np.where(loaded, self.load, 1.0), 0.0)
+
     @functools.cached_property
     def ratio(self) -> np.ndarray:
         """T/N; zero without load."""
-        tangential = np.hypot(self.force[:, 0], self.force[:, 1])
-        return self.per_load(tangential)
+        return self.per_load(np.hypot(self.force[:, 0], self.force[:, 1]))
 
     @functools.cached_property
     def floors(self) -> list[float]:
@@ -189,11 +175,6 @@ class Recording:
         near = [np.abs(self.ratio - floor) < SAME * floor for floor in self.floors]
         return self.standing & np.any(near, axis=0)
 
-    def per_load(self, value: np.ndarray) -> np.ndarray:
-        """Return a value over the normal force; zero without load."""
-        loaded = self.load > 0.0
-        return np.where(loaded, value / np.where(loaded, self.load, 1.0), 0.0)
-
     @functools.cached_property
     def centre(self) -> np.ndarray:
         """Centre of pressure, shape (n, 2), m, assuming that forces are measured at sole level."""
@@ -208,20 +189,15 @@ class Recording:
         return self.per_load(self.moment[:, 2] - x * self.force[:, 1] + y * self.force[:, 0])
 
     @functools.cached_property
-    def reach(self) -> np.ndarray:
-        """1 % and 99 % quantiles (rows) of x and y (columns) of the centre of pressure, m.
-
-        Only samples above half of the expected load count.
-        """
-        return np.quantile(self.centre[self.load > 0.5 * self.expected_load], [0.01, 0.99], axis=0)
-
-    @functools.cached_property
     def sole_radius(self) -> float:
-        """Radius of a disc with the area of the rectangle :attr:`reach`, m.
+        """Radius of a disc that stands for the sole, which the files do not contain, m.
 
-        It stands for the radius of the sole, which the files do not contain.
+        Its area is that of the rectangle between the 1 % and 99 % quantiles of the centre of
+        pressure above half of the expected load.
         """
-        return math.sqrt(float(np.prod(self.reach[1] - self.reach[0])) / math.pi)
+        loaded = self.centre[self.load > 0.5 * self.expected_load]
+        low, high = np.quantile(loaded, [0.01, 0.99], axis=0)
+        return math.sqrt(float(np.prod(high - low)) / math.pi)
 
     @functools.cached_property
     def quiet(self) -> np.ndarray:
@@ -247,10 +223,9 @@ class Recording:
         """Magnitude of the angular rate, rad/s."""
         return np.linalg.norm(self.rate, axis=1)
 
-    @functools.cached_property
-    def quiet_rate(self) -> float:
-        """Median angular rate at more than half of the expected load, rad/s; needs no label."""
-        return float(np.median(self.speed[self.load > 0.5 * self.expected_load]))
+    def usual(self, value: np.ndarray) -> float:
+        """Return the median of a value at more than half of the expected load; no label needed."""
+        return float(np.median(value[self.load > 0.5 * self.expected_load]))
 
 
 def read(path: pathlib.Path) -> Recording:
@@ -262,21 +237,11 @@ def read(path: pathlib.Path) -> Recording:
         When the file is missing, has anything but 13 columns of finite numbers, has labels other
         than 0, 1 and 2, or has no stable contact or no slip in stance.
     """
-    if not path.is_file():
-        raise InvalidInput(f'{path}: no such file; fetch it from {SOURCE}')
-    try:
-        table = np.loadtxt(path, delimiter=',', ndmin=2)
-    except ValueError as error:
-        raise InvalidInput(f'{path}: {error}; 13 columns of numbers are needed') from error
-    if table.shape[1] != 13 or not np.isfinite(table).all():
+    table = number_table(path, 13, SOURCE)
+    if not np.isfinite(table).all() or not np.isin(table[:, 12], (STABLE, NONE, SLIP)).all():
         raise InvalidInput(
-            f'{path} has {table.shape[1]} columns and {np.sum(~np.isfinite(table))} values that'
-            ' are not finite: 13 columns of finite numbers are needed'
-        )
-    if not np.isin(table[:, 12], (STABLE, NONE, SLIP)).all():
-        raise InvalidInput(
-            f'{path}: labels {np.unique(table[:, 12])} in column 13 are not allowed: each must be'
-            ' 0, 1 or 2'
+            f'{path}: 13 columns of finite numbers are needed, the last one (labels'
+            f' {np.unique(table[:, 12])}) 0, 1 or 2'
         )
     force, moment, acceleration, rate = np.split(table[:, :12], 4, axis=1)
     found = Recording(path.stem, force, moment, acceleration, rate, table[:, 12].astype(int))
@@ -288,76 +253,76 @@ def read(path: pathlib.Path) -> Recording:
     return found
 
 
+def number_table(path: pathlib.Path, columns: int, source: str) -> np.ndarray:
+    """Return the numbers of a file, NaN where a field is empty.
+
+    Raises
+    ------
+    InvalidInput
+        When the file is missing or has another number of columns.
+    """
+    if not path.is_file():
+        raise InvalidInput(f'{path}: no such file; fetch it from {source}')
+    try:
+        table = np.genfromtxt(path, delimiter=',', ndmin=2)
+    except ValueError as error:
+        raise InvalidInput(f'{path}: {error}; {columns} columns of numbers are needed') from error
+    if table.shape[1] != columns:
+        raise InvalidInput(f'{path} has shape {table.shape}: {columns} columns are needed')
+    return table
+
+
 # --- features ------------------------------------------------------------------------------------
 
 
 def features(recording: Recording) -> dict[str, np.ndarray]:
     """Return each feature by sample; a larger value makes slip more likely.
 
-    The features of one channel (:data:`AXES`) are magnitudes. Other rates, and the acceleration
-    and the rim speed, are decimal logarithms.
+    The features of one channel (:data:`AXES`) are magnitudes. Rate and acceleration are decimal
+    logarithms.
     """
-    low, high = recording.reach
-    off_centre = np.abs(recording.centre - 0.5 * (low + high)) / (0.5 * (high - low))
-    lever = 2.0 / 3.0 * recording.sole_radius
-    rim = lever * recording.speed
-
-    def logarithm(value: np.ndarray) -> np.ndarray:
-        return np.log10(np.maximum(value, LEAST))
-
     channels = np.column_stack(
         [recording.force, recording.moment, recording.acceleration, recording.rate]
     )
-    magnitudes = dict(zip(AXES, np.abs(channels).T, strict=True))
-    largest = {
-        f'{name} / largest': value / max(value.max(), LEAST) for name, value in magnitudes.items()
+    found = dict(zip(AXES, np.abs(channels).T, strict=True))
+    found |= {f'{name} / largest': row / max(row.max(), LEAST) for name, row in found.items()}
+    shaken = np.linalg.norm(recording.acceleration, axis=1)
+    lever = 2.0 / 3.0 * recording.sole_radius
+    return found | {
+        RATIO: recording.ratio,
+        # The ellipsoidal limit surface with the torsional limit 2/3 R μ N of a disc.
+        TWIST: np.hypot(recording.ratio, 1.5 * recording.torsion / recording.sole_radius),
+        RATE: np.log10(np.maximum(recording.speed, LEAST)),
+        CUSUM: cusum(recording, lever * recording.speed),
+        SHAKE: np.log10(np.maximum(shaken, LEAST)),
     }
-    return (
-        magnitudes
-        | largest
-        | {
-            RATIO: recording.ratio,
-            # The ellipsoidal limit surface with the torsional limit 2/3 R μ N of a disc.
-            TWIST: np.hypot(recording.ratio, 1.5 * recording.torsion / recording.sole_radius),
-            LIGHT: -recording.load / recording.expected_load,
-            EDGE: off_centre.max(axis=1),
-            MARGIN: -margin(recording),
-            RATE: logarithm(recording.speed),
-            YAW: logarithm(np.abs(recording.rate[:, 2])),
-            ROLL: logarithm(np.hypot(recording.rate[:, 0], recording.rate[:, 1])),
-            QUIETLY: logarithm(recording.speed / max(recording.quiet_rate, LEAST)),
-            LARGELY: logarithm(recording.speed / max(recording.speed.max(), LEAST)),
-            RIM: logarithm(rim),
-            CUSUM: cusum(recording, rim, lever * recording.quiet_rate),
-            SHAKE: logarithm(np.linalg.norm(recording.acceleration, axis=1)),
-        }
-    )
 
 
-def cusum(recording: Recording, speed: np.ndarray, quiet: float) -> np.ndarray:
+def cusum(recording: Recording, speed: np.ndarray) -> np.ndarray:
     """Return the statistic of ros_pad's slip alarm for a speed, m/s.
 
-    The noise is the speed of the quiet foot, m/s, with the default noise of Tuning. Nothing else
-    is fitted to the robot: the alarm tests for its default slip speed.
+    The noise is the speed of the quiet foot with the default noise of Tuning. Nothing else is
+    fitted to the robot: the alarm tests for its default slip speed.
     """
-    noise = math.hypot(quiet, Tuning().speed_noise)
+    noise = math.hypot(recording.usual(speed), Tuning().speed_noise)
     alarm = SlipAlarm(Tuning().smoothing, (SLOW_SLIP,))
     statistic = np.zeros(len(speed))
     for start, stop in recording.stances:
         alarm.reset()
         for index in range(start, stop):
-            alarm.update([(float(speed[index]), noise, recording.period)])
+            alarm.update(float(speed[index]), noise, recording.period)
             (statistic[index],) = alarm.statistics
     return statistic
 
 
-def margin(recording: Recording) -> np.ndarray:
-    """Return the friction margin that GroundFilter estimates without the position of the foot.
+def least_friction(recording: Recording) -> np.ndarray:
+    """Return the 5 % quantile of friction that GroundFilter estimates without a position.
 
     The slip speed is not measured: the filter gets zero with a standard deviation of 1 m/s. Each
     stance is on new ground, and T/N that does not change has no weight, as in FootEstimator.
     """
-    ground = GroundFilter(GroundModel(FrictionScales(PRIOR, learns=False)))
+    prior = FrictionPrior.of(Foot.load('large37'), 6.8)
+    ground = GroundFilter(GroundModel(FrictionScales(prior, learns=False)))
     noise = Tuning().ratio_noise
     window = round(Tuning().filter_period / recording.period)
     quantile = np.zeros(len(recording.label))
@@ -372,49 +337,34 @@ def margin(recording: Recording) -> np.ndarray:
             duration = (end - first) * recording.period
             ground.update(Evidence(ratio, noise, 0.0, 1.0, duration, weight))
             quantile[first:end] = ground.quantile(0.05)
-    return quantile - recording.ratio
+    return quantile
 
 
 # --- ranking -------------------------------------------------------------------------------------
 
 
-def auc_interval(
-    score: np.ndarray, recording: Recording, seed: int = 0, resamples: int = RESAMPLES
-) -> tuple[float, float]:
-    """Return the 95 % interval of the AUC, from stances drawn with replacement.
+def ranking(score: np.ndarray, recording: Recording, resamples: int = 200) -> dict[str, Any]:
+    """Return how well a score separates slip from stick in stance.
 
-    Stances are drawn instead of samples because samples of one stance depend on each other, while
-    stances are nearly independent.
+    ``interval`` is the 95 % interval of the AUC, from stances drawn with replacement, because
+    samples of one stance depend on each other. ``within_stance`` is the AUC over pairs of samples
+    of one stance, NaN without such pairs: they are hardly ever from two floors.
     """
-    draw = np.random.default_rng(seed)
     slip = [score[a:b][recording.slipping[a:b]] for a, b in recording.stances]
     stick = [score[a:b][recording.sticking[a:b]] for a, b in recording.stances]
-    found = []
-    for _ in range(resamples):
-        chosen = draw.integers(len(slip), size=len(slip))
-        found.append(
-            auc(
-                np.concatenate([slip[index] for index in chosen]),
-                np.concatenate([stick[index] for index in chosen]),
-            )
-        )
-    low, high = np.nanquantile(found, [0.025, 0.975])
-    return float(low), float(high)
 
+    def joined(chosen: np.ndarray) -> float:
+        return auc(*(np.concatenate([each[index] for index in chosen]) for each in (slip, stick)))
 
-def auc_within(score: np.ndarray, recording: Recording) -> float:
-    """Return the AUC over pairs of samples of the same stance, NaN without such pairs.
-
-    Unlike pairs from the whole recording, these are hardly ever from two floors.
-    """
-    wins = pairs = 0.0
-    for start, stop in recording.stances:
-        slip = score[start:stop][recording.slipping[start:stop]]
-        stick = score[start:stop][recording.sticking[start:stop]]
-        if len(slip) and len(stick):
-            wins += auc(slip, stick) * len(slip) * len(stick)
-            pairs += len(slip) * len(stick)
-    return wins / pairs if pairs else math.nan
+    draw = np.random.default_rng(0)
+    drawn = [joined(draw.integers(len(slip), size=len(slip))) for _ in range(resamples)]
+    pairs = [(auc(a, b), len(a) * len(b)) for a, b in zip(slip, stick, strict=True) if a.size]
+    aucs, counts = np.array([pair for pair in pairs if pair[1]]).reshape(-1, 2).T
+    return {
+        'auc': auc(score[recording.slipping], score[recording.sticking]),
+        'interval': tuple(np.nanquantile(drawn, [0.025, 0.975]).tolist()),
+        'within_stance': (float(np.average(aucs, weights=counts)) if len(aucs) else math.nan),
+    }
 
 
 # --- probability ---------------------------------------------------------------------------------
@@ -422,15 +372,7 @@ def auc_within(score: np.ndarray, recording: Recording) -> float:
 
 @dataclass(frozen=True)
 class Logistic:
-    """A logistic fit: probability 1/(1 + exp(-(intercept + slope · x))).
-
-    Attributes
-    ----------
-    intercept : float
-        Log odds at zero.
-    slope : ndarray, shape (k,)
-        Log odds per unit of each feature.
-    """
+    """A logistic fit: probability 1/(1 + exp(-(intercept + slope · x)))."""
 
     intercept: float
     slope: np.ndarray
@@ -460,11 +402,6 @@ def fit(x: np.ndarray, slip: np.ndarray, ridge: float = 1e-4) -> Logistic:
     return Logistic(float(weights[0] - slope @ centre), slope)
 
 
-def brier(probability: np.ndarray, slip: np.ndarray) -> float:
-    """Return the mean squared error of a probability of slip."""
-    return float(np.mean((probability - slip) ** 2))
-
-
 def reliability(
     probability: np.ndarray, slip: np.ndarray, bins: int = 10, least: int = 20
 ) -> list[tuple[float, float, int]]:
@@ -473,18 +410,12 @@ def reliability(
     Bins with fewer than ``least`` samples are left out.
     """
     place = np.minimum((probability * bins).astype(int), bins - 1)
-    found = []
-    for index in range(bins):
-        inside = place == index
-        if inside.sum() >= least:
-            found.append(
-                (
-                    float(probability[inside].mean()),
-                    float(slip[inside].mean()),
-                    int(inside.sum()),
-                )
-            )
-    return found
+    masks = [place == index for index in range(bins)]
+    return [
+        (float(probability[mask].mean()), float(slip[mask].mean()), int(mask.sum()))
+        for mask in masks
+        if mask.sum() >= least
+    ]
 
 
 class Study:
@@ -501,13 +432,9 @@ class Study:
         return [each for each in self.recordings if each.robot != recording.robot]
 
     def columns(self, recording: Recording, name: str) -> np.ndarray:
-        """Return the features that a detector of :data:`FITTED`, or a single feature, uses.
-
-        The shape is (n, k): samples by features.
-        """
-        return np.column_stack(
-            [self.features[recording.name][each] for each in FITTED.get(name, (name,))]
-        )
+        """Return samples by the features that a detector uses."""
+        found = self.features[recording.name]
+        return np.column_stack([found[each] for each in FITTED.get(name, (name,))])
 
     def fitted(self, name: str, parts: Sequence[tuple[Recording, slice]]) -> Logistic:
         """Return the fit to samples of parts of recordings that are in stance and have contact."""
@@ -523,90 +450,27 @@ class Study:
         """Return the log odds of slip by sample.
 
         If ``own``, each half of the recording gets the fit to its other half; otherwise all of the
-        recording gets the fit to all other robots.
+        recording gets the fit to all other robots. Halves of the slips end with a stance.
         """
         x = self.columns(recording, name)
         if not own:
             whole = [(each, slice(None)) for each in self.others(recording)]
             return self.fitted(name, whole).log_odds(x)
-        half = self._middle(recording)
+        slips = np.flatnonzero(recording.slipping)
+        half = next(end for start, end in recording.stances if end > slips[len(slips) // 2])
+        early, late = slice(half), slice(half, None)
         return np.concatenate(
             [
-                self.fitted(name, [(recording, slice(half, None))]).log_odds(x[:half]),
-                self.fitted(name, [(recording, slice(half))]).log_odds(x[half:]),
+                self.fitted(name, [(recording, late)]).log_odds(x[early]),
+                self.fitted(name, [(recording, early)]).log_odds(x[late]),
             ]
         )
-
-    @staticmethod
-    def _middle(recording: Recording) -> int:
-        """Return the end of the stance that divides a recording's labelled slips in halves."""
-        slips = np.flatnonzero(recording.slipping)
-        return recording.stances[recording.stance[slips[len(slips) // 2]]][1]
 
     def score(self, recording: Recording, name: str, own: bool) -> np.ndarray:
         """Return the quantity that an alarm compares with its threshold, by sample."""
         if name in FITTED:
             return self.log_odds(recording, name, own)
         return self.features[recording.name][name]
-
-    # --- tables -------------------------------------------------------------------------------
-
-    def labels(self, recording: Recording) -> dict[str, Any]:
-        """Return how labels, forces and rates of a recording are related."""
-        slip, stick = recording.slipping, recording.sticking
-        after, before = _distance_to_edges(recording)
-        at_edge = np.minimum(after, before) * recording.period < EDGE_TIME
-        horizontal = np.hypot(recording.rate[:, 0], recording.rate[:, 1])
-        all_slips = recording.label == SLIP
-        ratio, rate = recording.ratio, recording.speed
-        ends = [stop - 1 for _, stop in recording.stances]
-        quantile = (margin(recording) + ratio)[ends]
-        return {
-            'samples': len(recording.label),
-            'stances': len(recording.stances),
-            'slips': int(slip.sum()),
-            'expected_load_N': recording.expected_load,
-            'sole_radius_m': recording.sole_radius,
-            'quiet_rate_rad_s': recording.quiet_rate,
-            'slip_without_force': float(np.mean(recording.load[all_slips] <= 0.0)),
-            'slip_below_gate': float(np.mean(~recording.standing[all_slips])),
-            'floors': recording.floors,
-            'slip_at_friction': float(np.mean(recording.at_friction[slip])),
-            'stick_at_friction': float(np.mean(recording.at_friction[stick])),
-            'slip_above_label_rate': float(np.mean(rate[slip] > LABEL_RATE)),
-            'stick_above_label_rate': float(np.mean(rate[stick] > LABEL_RATE)),
-            'slip_rate_least_rad_s': float(rate[slip].min()),
-            'stick_rate_median_rad_s': float(np.median(rate[stick])),
-            'slip_at_edge': float(np.mean(at_edge[slip])),
-            'stick_at_edge': float(np.mean(at_edge[stick])),
-            'slip_rolls': float(np.mean((horizontal > np.abs(recording.rate[:, 2]))[slip])),
-            'slip_on_a_point': float(np.mean(np.abs(recording.torsion[slip]) < POINT)),
-            'stick_on_a_point': float(np.mean(np.abs(recording.torsion[stick]) < POINT)),
-            'slip_ratio_median': float(np.median(ratio[slip])),
-            'stick_ratio_median': float(np.median(ratio[stick])),
-            'friction_below_quantile': (
-                float(np.mean(quantile > recording.floors[0]))
-                if len(recording.floors) == 1
-                else None
-            ),
-            'quantile_median': float(np.median(quantile)),
-        }
-
-    def ranking(self, recording: Recording, name: str) -> dict[str, Any]:
-        """Return how well a score separates slip from stick."""
-        score = self.score(recording, name, own=True)
-        everywhere = recording.label == SLIP, recording.label == STABLE
-        at_friction = None
-        if name in FORCELESS and len(recording.floors) == 1:
-            below = recording.standing & (recording.ratio < 0.9 * recording.floors[0])
-            at_friction = auc(score[recording.at_friction], score[below])
-        return {
-            'at_friction': at_friction,
-            'auc': auc(score[recording.slipping], score[recording.sticking]),
-            'interval': auc_interval(score, recording),
-            'within_stance': auc_within(score, recording),
-            'whatever_load': auc(*(score[mask] for mask in everywhere)),
-        }
 
     def alarm(self, recording: Recording, name: str) -> dict[str, Any]:
         """Return figures of an alarm, with the threshold of this recording and of other robots."""
@@ -622,19 +486,16 @@ class Study:
         """Return the accuracy of the probability of slip, fitted to this robot and to others."""
         use = recording.slipping | recording.sticking
         slip = recording.slipping[use]
-        found: dict[str, Any] = {}
+        share = float(slip.mean())
+        found: dict[str, Any] = {'share': share, 'brier_of_share': share * (1.0 - share)}
         for word, own in (('own', True), ('other', False)):
-            odds = self.log_odds(recording, name, own)[use]
-            probability = special.expit(odds)
+            probability = special.expit(self.log_odds(recording, name, own)[use])
             found[word] = {
-                'auc': auc(odds[slip], odds[~slip]),
-                'brier': brier(probability, slip),
+                'brier': float(np.mean((probability - slip) ** 2)),
                 'accuracy': float(np.mean((probability > 0.5) == slip)),
-                'mean': float(probability.mean()),
                 'reliability': reliability(probability, slip),
             }
-        share = float(slip.mean())
-        return found | {'share': share, 'brier_of_share': share * (1.0 - share)}
+        return found
 
     def run(self) -> dict[str, Any]:
         """Return the document with all tables, by recording."""
@@ -644,22 +505,43 @@ class Study:
         }  # fmt: skip
         for each in command.each(self.recordings, 'tables', 'file'):
             document['recordings'][each.name] = {
-                'labels': self.labels(each),
-                'ranking': {name: self.ranking(each, name) for name in RANKED},
+                'labels': labels(each),
+                'ranking': {name: ranking(self.score(each, name, True), each) for name in RANKED},
                 'alarm': {name: self.alarm(each, name) for name in ALARMED},
                 'calibration': {name: self.calibration(each, name) for name in CALIBRATED},
             }
         return document
 
 
-def _distance_to_edges(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
-    """Return the number of samples since touch-down and until lift-off; infinite in the air."""
-    after = np.full(len(recording.label), math.inf)
-    before = after.copy()
+def labels(recording: Recording) -> dict[str, Any]:
+    """Return how labels, forces and rates of a recording are related."""
+    at_edge = np.zeros(len(recording.label), dtype=bool)
+    edge = math.ceil(EDGE_TIME / recording.period)
     for start, stop in recording.stances:
-        after[start:stop] = np.arange(stop - start)
-        before[start:stop] = np.arange(stop - start)[::-1]
-    return after, before
+        at_edge[start : min(start + edge, stop)] = True
+        at_edge[max(start, stop - edge) : stop] = True
+    ends = [stop - 1 for _, stop in recording.stances]
+    quantile = least_friction(recording)[ends]
+    found: dict[str, Any] = {
+        'samples': len(recording.label),
+        'stances': len(recording.stances),
+        'slips': int(recording.slipping.sum()),
+        'expected_load_N': recording.expected_load,
+        'slip_below_gate': float(np.mean(~recording.standing[recording.label == SLIP])),
+        'floors': recording.floors,
+    }
+    marks = {
+        'at_friction': recording.at_friction,
+        'above_label_rate': recording.speed > LABEL_RATE,
+        'at_edge': at_edge,
+        'on_a_point': np.abs(recording.torsion) < POINT,
+    }
+    for name, mark in marks.items():
+        found[f'slip_{name}'] = float(np.mean(mark[recording.slipping]))
+        found[f'stick_{name}'] = float(np.mean(mark[recording.sticking]))
+    one = recording.floors[0] if len(recording.floors) == 1 else None
+    below = None if one is None else float(np.mean(quantile > one))
+    return found | {'friction_below_quantile': below}
 
 
 # --- alarms --------------------------------------------------------------------------------------
@@ -702,78 +584,25 @@ def alarm_figures(
         'events': len(slips),
         'missed': 1.0 - len(delays) / len(slips) if len(slips) >= fewest else None,
         'delay_s': float(np.median(delays)) if delays else None,
-        'false_per_minute': (false_alarms(score, threshold, recording) / recording.quiet_minutes),
+        'false_per_minute': false_alarms(score, threshold, recording) / recording.quiet_minutes,
     }
 
 
-# --- tables and pictures -------------------------------------------------------------------------
+# --- table and picture ---------------------------------------------------------------------------
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return the tables as text."""
-    rows = document['recordings']
-    wide = max(28, *map(len, rows)) + 2
-    lines = []
-
-    def section(title: str, part: str, names: Iterable[str], cell: Callable[[Any], str]) -> None:
-        lines.extend(['', title, ' ' * 28 + ''.join(f'{each:>{wide}}' for each in rows)])
-        for name in names:
-            cells = (cell(row[part][name]) for row in rows.values())
-            lines.append(f'{name:28}' + ''.join(f'{each:>{wide}}' for each in cells))
-
-    first = next(iter(rows.values()))
-    section('labels, with forces and rates', 'labels', first['labels'], _cell)
-    section(
-        'AUC of slip over stick in stance, its 95 % interval, and over pairs of one stance',
-        'ranking',
-        RANKED,
-        lambda each: '{} {}-{} {}'.format(
-            *(f'{x:.3f}' for x in (each['auc'], *each['interval'], each['within_stance']))
-        ),
-    )
-    section(
-        'AUC at all loads; AUC of samples at the friction of the floor over samples below it',
-        'ranking',
-        RANKED,
-        lambda each: f'{_cell(each["whatever_load"])} {_cell(each["at_friction"])}',
-    )
-    section(
-        f'slips missed %, delay ms at {FALSE_PER_MINUTE:g} false alarm a minute;'
-        ' missed %, false a minute with the threshold of the other robot',
-        'alarm',
-        ALARMED,
-        lambda each: '{} {}; {} {}'.format(
-            _scaled(each['own']['missed'], 1e2),
-            _scaled(each['own']['delay_s'], 1e3),
-            _scaled(each['other']['missed'], 1e2),
-            _scaled(each['other']['false_per_minute'], 1.0),
-        ),
-    )
-    section(
-        'probability: Brier, accuracy, fitted to the other half; fitted to the other robot',
-        'calibration',
-        CALIBRATED,
-        lambda each: '{:.3f} {:.3f}; {:.3f} {:.3f}'.format(
-            *(each[word][key] for word in ('own', 'other') for key in ('brier', 'accuracy'))
-        ),
-    )
-    section(
-        'Brier and accuracy of a constant probability, the share of slip',
-        'calibration',
-        CALIBRATED[:1],
-        lambda each: f'{each["brier_of_share"]:.3f} {1.0 - each["share"]:.3f}',
-    )
-    return '\n'.join(lines[1:])
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, list):
-        return ' '.join(map(_cell, value))
-    return '-' if value is None else f'{value:d}' if isinstance(value, int) else f'{value:.3g}'
-
-
-def _scaled(value: float | None, factor: float) -> str:
-    return '-' if value is None else f'{factor * value:.0f}'
+    """Return labels, ranking, alarms and probabilities as text."""
+    found = document['recordings']
+    lines = [command.listed([{'file': name, **row['labels']} for name, row in found.items()])]
+    for part in ('ranking', 'alarm', 'calibration'):
+        rows = [
+            {'file': name, part: score, **row}
+            for name, parts in found.items()
+            for score, row in parts[part].items()
+        ]
+        lines.append(command.listed(rows))
+    return '\n\n'.join(lines)
 
 
 COLOURS = (SKY, BLUE, GREEN, ORANGE, VERMILION, PURPLE, BLACK)
@@ -783,12 +612,11 @@ def draw(study: Study, document: dict[str, Any]) -> Figure:
     """Return the picture: ranking, T/N, angular rate and calibration."""
     rows = document['recordings']
     colours = dict(zip(rows, COLOURS, strict=False))
-    mixed = max(study.recordings, key=lambda each: len(each.floors))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 8.0), layout='constrained')
         a, b, c, d = figure.subplots(2, 2).ravel()
         _draw_ranking(a, rows, colours)
-        _draw_ratio(b, mixed)
+        _draw_ratio(b, max(study.recordings, key=lambda each: len(each.floors)))
         _draw_rate(c, study.recordings, colours)
         _draw_reliability(d, rows, colours)
     return figure
@@ -796,15 +624,13 @@ def draw(study: Study, document: dict[str, Any]) -> Figure:
 
 def _draw_ranking(panel: Axes, rows: dict[str, Any], colours: dict[str, str]) -> None:
     for number, (name, row) in enumerate(rows.items()):
-        shift = 0.15 * (number - 0.5 * (len(rows) - 1))
-        places = np.arange(len(RANKED)) + shift
+        places = np.arange(len(RANKED)) + 0.15 * (number - 0.5 * (len(rows) - 1))
         found = [row['ranking'][each] for each in RANKED]
         ends = np.array([each['interval'] for each in found]).T
         panel.hlines(places, *ends, color=colours[name], lw=1.4)
-        panel.plot(
-            [each['auc'] for each in found], places, 'o', ms=4.0, color=colours[name],
-            label=name.replace('_', ' '),
-        )  # fmt: skip
+        values = [each['auc'] for each in found]
+        label = name.replace('_', ' ')
+        panel.plot(values, places, 'o', ms=4.0, color=colours[name], label=label)
     panel.axvline(0.5, color=BLACK, lw=0.9, ls='--')
     panel.set_yticks(range(len(RANKED)), RANKED)
     panel.set(
@@ -815,20 +641,17 @@ def _draw_ranking(panel: Axes, rows: dict[str, Any], colours: dict[str, str]) ->
 
 
 def _draw_ratio(panel: Axes, recording: Recording) -> None:
-    bins = np.linspace(0.0, 0.6, 61)
-    looks: tuple[dict[str, Any], ...] = (
-        {'color': BLUE, 'alpha': 0.45},
-        {'color': VERMILION, 'histtype': 'step', 'lw': 1.6},
-    )
-    masks = {'stable': recording.sticking, 'slip': recording.slipping}
-    for (label, mask), look in zip(masks.items(), looks, strict=True):
+    bins = np.linspace(0.0, 0.6, 61).tolist()
+    for label, mask, colour in (
+        ('stable', recording.sticking, BLUE), ('slip', recording.slipping, VERMILION)
+    ):  # fmt: skip
         weights = np.full(mask.sum(), 100.0 / mask.sum())
-        panel.hist(recording.ratio[mask], bins.tolist(), weights=weights, label=label, **look)
-    top = panel.get_ylim()[1]
-    panel.plot(recording.floors, np.full(len(recording.floors), -0.02 * top), '^', color=BLACK,
-               ms=5.0, ls='', clip_on=False, label='friction of its floors', zorder=5)  # fmt: skip
+        panel.hist(recording.ratio[mask], bins, weights=weights, label=label, color=colour,
+                   histtype='step', lw=1.6)  # fmt: skip
+    panel.plot(recording.floors, np.zeros(len(recording.floors)), '^', color=BLACK, ms=5.0,
+               clip_on=False, label='friction of its floors', zorder=5)  # fmt: skip
     panel.set(
-        xlim=(0.0, 0.6), ylim=(0.0, top), xlabel='T/N', ylabel='% of samples in stance, each 0.01',
+        xlim=(0.0, 0.6), xlabel='T/N', ylabel='% of samples in stance, each 0.01',
         title=f'b  {recording.name.replace("_", " ")}: T/N of both',
     )  # fmt: skip
     panel.legend(fontsize=8)
@@ -841,36 +664,24 @@ def _draw_rate(panel: Axes, recordings: Sequence[Recording], colours: dict[str, 
             share = np.arange(1, len(values) + 1) / len(values)
             panel.plot(values, 100.0 * share, look, color=colours[recording.name], lw=1.3)
     panel.axvline(LABEL_RATE, color=BLACK, lw=0.9, ls=':')
-    panel.text(0.92 * LABEL_RATE, 70.0, '0.08 rad/s', fontsize=8, ha='right')
-    panel.plot([], [], '-', color='#777777', label='stable')
-    panel.plot([], [], '--', color='#777777', label='slip')
     panel.set(
         xscale='log', xlim=(1e-4, 2.0), ylim=(0.0, 101.0),
-        xlabel='angular rate of the foot in stance (rad/s)', ylabel='% of samples below',
-        title='c  angular rate, and where most labels turn',
+        xlabel='angular rate of the foot in stance (rad/s); dotted: 0.08',
+        ylabel='% of samples below', title='c  angular rate: stable (solid), slip (dashed)',
     )  # fmt: skip
-    panel.legend(fontsize=8, loc='upper left')
 
 
 def _draw_reliability(panel: Axes, rows: dict[str, Any], colours: dict[str, str]) -> None:
     panel.plot([0.0, 1.0], [0.0, 1.0], color=BLACK, lw=0.9, ls='--')
     for name, row in rows.items():
-        looks: dict[str, dict[str, Any]] = {
-            'own': {'ls': '-'},
-            'other': {'ls': ':', 'mfc': 'white'},
-        }
-        for word, look in looks.items():
+        for word, style in (('own', '-'), ('other', ':')):
             points = np.array(row['calibration'][RATE][word]['reliability'])
-            panel.plot(points[:, 0], points[:, 1], marker='o', ms=4.0, lw=1.3, clip_on=False,
-                       color=colours[name], **look)  # fmt: skip
-    panel.plot([], [], 'o-', color='#777777', ms=4.0, label='fitted to its other half')
-    panel.plot([], [], 'o:', color='#777777', ms=4.0, mfc='white',
-               label='fitted to the other robot')  # fmt: skip
+            panel.plot(*points[:, :2].T, style, marker='o', ms=4.0, lw=1.3, color=colours[name])
     panel.set(
         xlim=(0.0, 1.0), ylim=(0.0, 1.0), xlabel='probability of slip from the angular rate',
-        ylabel='share labelled slip', title='d  calibration of the probability',
+        ylabel='share labelled slip',
+        title='d  probability, fitted to its other half (solid), to the other robot (dotted)',
     )  # fmt: skip
-    panel.legend(fontsize=8, loc='upper left', bbox_to_anchor=(0.16, 0.97))
 
 
 def main(words: Sequence[str]) -> int:

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 import pathlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.alarm import THRESHOLD
 from ros_pad.estimation.foot import ContactMotion, FootEstimator
@@ -28,7 +27,6 @@ from studies import command
 from studies.closed_loop.labelled_contacts import (
     CUSUM,
     NONE,
-    RANKED,
     RATE,
     RATIO,
     SHAKE,
@@ -37,11 +35,11 @@ from studies.closed_loop.labelled_contacts import (
     TWIST,
     Recording,
     alarm_figures,
-    auc_interval,
-    auc_within,
     cusum,
     features,
+    number_table,
     operating_threshold,
+    ranking,
 )
 from studies.samples import auc, runs, share_interval
 
@@ -75,31 +73,12 @@ UNKNOWN_SPEED = 1.0
 """Standard deviation of the velocity of a foot that is not measured, m/s."""
 
 
-def number_table(path: pathlib.Path, columns: int) -> np.ndarray:
-    """Return the numbers of a file, NaN where a field is empty.
-
-    Raises
-    ------
-    InvalidInput
-        When the file is missing or has another number of columns.
-    """
-    if not path.is_file():
-        raise InvalidInput(f'{path}: no such file; fetch it from {SOURCE}')
-    try:
-        table = np.genfromtxt(path, delimiter=',')
-    except ValueError as error:
-        raise InvalidInput(f'{path}: {error}; {columns} columns of numbers are needed') from error
-    if table.ndim != 2 or table.shape[1] != columns:
-        raise InvalidInput(f'{path} has shape {table.shape}: {columns} columns are needed')
-    return table
-
-
 # --- ATLAS ---------------------------------------------------------------------------------------
 
 
 def read_atlas(path: pathlib.Path) -> Recording:
     """Return the recording of ATLAS in a file."""
-    table = number_table(path, 13)
+    table = number_table(path, 13, SOURCE)
     force, moment, acceleration, rate = np.split(table[:, :12], 4, axis=1)
     label = np.where(table[:, 12] == 1.0, STABLE, SLIP)
     found = Recording(path.stem, force, moment, acceleration, rate, label, ATLAS_PERIOD)
@@ -125,10 +104,7 @@ def inertial_speed(recording: Recording) -> np.ndarray:
 
 def scores_of(recording: Recording) -> dict[str, np.ndarray]:
     """Return each score by sample."""
-    speed = inertial_speed(recording)
-    # As for the rim: the median at more than half of the expected load, which needs no label.
-    quiet = float(np.median(speed[recording.load > 0.5 * recording.expected_load]))
-    return features(recording) | {INERTIAL: cusum(recording, speed, quiet)}
+    return features(recording) | {INERTIAL: cusum(recording, inertial_speed(recording))}
 
 
 def on_patch(recording: Recording) -> dict[str, Any]:
@@ -155,13 +131,7 @@ def atlas(recordings: Sequence[Recording]) -> dict[str, Any]:
     }
     document: dict[str, Any] = {}
     for each in recordings:
-        score, part = scores[each.name], {}
-        for name in (*RANKED[:5], *OWN[2:]):
-            part[name] = {
-                'auc': auc(score[name][each.slipping], score[name][each.sticking]),
-                'interval': auc_interval(score[name], each),
-                'within_stance': auc_within(score[name], each),
-            }
+        score = scores[each.name]
         alarms = {f'{name}, own threshold': (name, thresholds[name]) for name in OWN}
         alarms |= {f'{name}, as shipped': (name, THRESHOLD) for name in SHIPPED}
         figures = {}
@@ -169,7 +139,11 @@ def atlas(recordings: Sequence[Recording]) -> dict[str, Any]:
             found = alarm_figures(score[name], threshold, each, fewest=1)
             missed = round(found['missed'] * found['events'])
             figures[word] = found | {'missed_interval': share_interval(missed, found['events'])}
-        document[each.name] = {'labels': on_patch(each), 'ranking': part, 'alarm': figures}
+        document[each.name] = {
+            'labels': on_patch(each),
+            'ranking': {name: ranking(score[name], each) for name in OWN},
+            'alarm': figures,
+        }
     return document
 
 
@@ -245,7 +219,7 @@ def go1(folder: pathlib.Path) -> dict[str, Any]:
     document: dict[str, Any] = {'ground': {}, 'auc': {}}
     stances = {}
     for name, ground in GO1.items():
-        table = number_table(folder / f'{name}.csv', 7)
+        table = number_table(folder / f'{name}.csv', 7, SOURCE)
         force = table[np.isfinite(table[:, 0]), 0]
         imu = table[np.isfinite(table[:, 1:]).all(axis=1), 1:]
         stances[ground] = go1_stances(imu)
@@ -286,57 +260,18 @@ def run(folder: pathlib.Path) -> dict[str, Any]:
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return the tables of the documentation."""
-    rows = document['atlas']
-    lines = _table('AUC of slip, in stance', rows, 'ranking', _ranked)
-    lines += ['', *_table('alarm: slips missed; delay; false a minute', rows, 'alarm', _alarmed)]
-    grounds = document['go1']['ground']
-    lines += ['', '| Go1 | ' + ' | '.join(grounds) + ' |', '|---' * (len(grounds) + 1) + '|']
-    for key in ('seconds', 'stances', 'alarms', 'doubt', 'wet_probability', 'friction_mean'):
-        lines.append(
-            f'| {key} | ' + ' | '.join(_cell(each[key]) for each in grounds.values()) + ' |'
-        )
-    head = ' | '.join(
-        ['stances of the Go1', *grounds, 'AUC, greased over normal', 'over mattress']
-    )
-    lines += ['', f'| {head} |', '|---' * (len(grounds) + 3) + '|']
-    for key, found in document['go1']['auc'].items():
-        medians = ' | '.join(f'{each["median"][key]:.3g}' for each in grounds.values())
-        cells = ' | '.join('{:.2f} ({:.2f} to {:.2f})'.format(*each) for each in found.values())
-        lines.append(f'| {key} | {medians} | {cells} |')
-    return '\n'.join(lines)
-
-
-def _table(
-    title: str, rows: dict[str, Any], part: str, cell: Callable[[dict[str, Any]], str]
-) -> list[str]:
-    lines = [f'| {title} | ' + ' | '.join(rows) + ' |', '|---' * (len(rows) + 1) + '|']
-    for name in next(iter(rows.values()))[part]:
-        lines.append(
-            f'| {name} | ' + ' | '.join(cell(row[part][name]) for row in rows.values()) + ' |'
-        )
-    return lines
-
-
-def _ranked(each: dict[str, Any]) -> str:
-    return '{:.2f} ({:.2f} to {:.2f})'.format(each['auc'], *each['interval'])
-
-
-def _alarmed(each: dict[str, Any]) -> str:
-    missed, low, high = (100.0 * share for share in (each['missed'], *each['missed_interval']))
-    delay = '-' if each['delay_s'] is None else f'{1e3 * each["delay_s"]:.0f} ms'
-    return (
-        f'{missed:.0f} % of {each["events"]} ({low:.0f} to {high:.0f} %); {delay};'
-        f' {each["false_per_minute"]:.0f}'
-    )
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, dict):
-        return ', '.join(f'{key} {100 * share:.0f} %' for key, share in value.items())
-    if isinstance(value, list):
-        return ' to '.join(f'{each:.3g}' for each in value)
-    return f'{value:.3g}'
+    """Return ranking and alarms on ATLAS, and what the stances of the Go1 show, as text."""
+    lines = [command.listed([{'file': k, **r['labels']} for k, r in document['atlas'].items()])]
+    for part in ('ranking', 'alarm'):
+        rows = [
+            {'file': name, part: score, **found}
+            for name, row in document['atlas'].items()
+            for score, found in row[part].items()
+        ]
+        lines.append(command.listed(rows))
+    for part in ('ground', 'auc'):
+        lines.append(command.listed([{part: k, **r} for k, r in document['go1'][part].items()]))
+    return '\n\n'.join(lines)
 
 
 def main(words: Sequence[str]) -> int:

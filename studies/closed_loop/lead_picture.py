@@ -28,7 +28,6 @@ from ros_pad.contact import LARGE_PAD, film_thickness, force_limit, inflate
 from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
-from ros_pad.reports import path_map
 from ros_pad.reports.files import save
 from ros_pad.reports.pictures import draw_comparison
 from ros_pad.reports.style import STYLE, rendered
@@ -38,6 +37,7 @@ from ros_pad.simulation.margin import mid_stance_grip, reserve
 from ros_pad.simulation.terms import terms
 from ros_pad.trials import Trial, run
 from studies import command
+from studies.closed_loop import walk_map
 from studies.work_precision.film import STANCE_DOME, dry_dome
 
 SCENE, SEED = 'hexapod_patches', 0
@@ -74,13 +74,13 @@ def lead_picture(
     refuse(path, force)
     drawn = next((trial for trial in trials if trial.policy == 'adaptive'), trials[0])
     view = view_of(drawn, [trial for trial in trials if trial is not drawn])
-    rows = max(2, path_map.rows_of(view))
+    rows = max(2, walk_map.rows_of(drawn))
     wide, map_width = 16.0, 9.7
-    tall = path_map.height(view, rows, map_width) + 1.55
+    tall = walk_map.height(drawn, rows, map_width) + 1.55
     with matplotlib.rc_context(STYLE | {'font.size': 13.0}):
         figure = Figure(figsize=(wide, tall), dpi=100)
-        path_map.draw(figure, view, rows, 0.95, 0.6, map_width, size=8.0)
-        bars = path_map.panel(figure, 12.35, 0.6, 3.45, tall - 1.15)
+        walk_map.draw(figure, drawn, view.load_gate, rows, 0.95, 0.6, map_width, size=8.0)
+        bars = walk_map.panel(figure, 12.35, 0.6, 3.45, tall - 1.15)
         draw_comparison(bars, view, size=14.0)
         bars.tick_params(axis='y', labelsize=14.0)
         for x, title in (
@@ -91,7 +91,7 @@ def lead_picture(
                 x / wide, 1.0 - 0.12 / tall, title, va='top', fontsize=16.0, fontweight='bold'
             )
         figure.legend(
-            handles=path_map.handles(view, slide=False),
+            handles=walk_map.handles(),
             loc='upper left',
             bbox_to_anchor=(0.85 / wide, 1.0 - 0.4 / tall),
             ncols=3,

@@ -2,23 +2,16 @@
 """Compare the adaptive policy with fixed shapes, rivals of the literature and the oracle.
 
 Walks variants of ``hexapod_patches`` with full dynamics (L2). Everything was tuned on the tuning
-grounds (``--tune``, in a walk without dynamics, at most nine settings a policy; ``--tune
---dynamics``, the adaptive policy and its nearest rival in L2) and is compared on grounds that
-differ from them in a condition: patch length, wet share, film, towed load, friction of the feet.
-Then on grounds where adapting cannot win, or where the foot's file is wrong, and with fixed shapes
-at slower gaits. Every gain has a 95 % bootstrap interval over floors. Writes policies.json and
-.png, and the tables of docs/model/policies.md.
-
-Walks are kept in ``--walks``: a run after a change makes only those that the change concerns.
+grounds (``--tune``, at most nine settings a policy) and is compared on
+grounds that differ from them in a condition: patch length, wet share, film, towed load,
+friction of the feet. Then on grounds where adapting cannot win, or where the foot's file is
+wrong, and with fixed shapes at slower gaits. Every gain has a 95 % bootstrap interval over floors.
+Writes policies.json and .png, and the tables of docs/model/policies.md.
 """
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import json
-import os
-import pathlib
 import statistics
 import time
 from collections.abc import Mapping, Sequence
@@ -26,6 +19,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import MorphologyController, adaptive, first_morphologies, policy_named
@@ -34,9 +31,10 @@ from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.closed_loop import loops, quick_walk, rivals
-from studies.closed_loop.policies_figure import BETTER, draw
+from studies.closed_loop import loops, rivals
+from studies.drawing import BLACK, BLUE, GREEN, STYLE
 
+BETTER = 'better fixed shape'
 SCENE = 'hexapod_patches'
 LEVEL = 'L2'
 FIRST_SEED = 10_000
@@ -94,9 +92,6 @@ SETTINGS: dict[str, list[tuple[Any, ...]]] = {
     'discounted_ucb': [*itertools.product((0.8, 0.9, 0.95), (0.05, 0.2, 0.5))],
 }
 """Settings that are tried on the tuning grounds; of the adaptive policy, ``probe_below``."""
-
-FINAL: dict[str, list[tuple[Any, ...]]] = {'count': [(8,)], 'adaptive': [(0.8,)]}
-"""Settings that are tried there in L2."""
 
 RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
     'each 8 steps': ('count', (8,)),
@@ -174,54 +169,6 @@ def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: in
     return loop
 
 
-# --- walks that are kept -------------------------------------------------------------------------
-
-
-def _code(policy: str) -> str:
-    """Return a digest of the code that a walk under a policy depends on."""
-    source = command.ROOT / 'ros_pad'
-    parts = ('contact', 'estimation', 'simulation', 'regulators', 'robots', 'sensing', 'trials')
-    files = [path for part in parts for path in sorted((source / part).rglob('*.py'))]
-    files += sorted((command.ROOT / 'config').rglob('*.yaml'))
-    if policy not in ('flat', 'dome'):
-        control = sorted((source / 'control').glob('*.py'))
-        files += [path for path in control if policy == 'adaptive' or path.name != 'policies.py']
-    if policy in RIVALS:
-        files.append(pathlib.Path(rivals.__file__))
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def walked(jobs: Sequence[Job], kept: pathlib.Path, processes: int) -> dict[Job, Any]:
-    """Return the results of walks; those that are not in the file ``kept`` are made, and added."""
-    code = {policy: _code(policy) for policy in {job.policy for job in jobs}}
-    keys = {}
-    for job in jobs:
-        what = (job, GROUNDS[job.ground], RIVALS.get(job.policy), code[job.policy])
-        keys[job] = hashlib.sha256(repr(what).encode()).hexdigest()
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    lines = kept.read_text().splitlines() if kept.exists() else []
-    known = dict(map(json.loads, lines))
-    missing = [(job, keys[job], kept) for job in jobs if keys[job] not in known]
-    for (job, _, _), result in zip(
-        missing, command.in_processes(_walk_and_keep, missing, processes, 'policies'), strict=True
-    ):
-        known[keys[job]] = result
-    return {job: known[keys[job]] for job in jobs}
-
-
-def _walk_and_keep(job: Job, key: str, kept: pathlib.Path) -> tuple[float, int, str | None]:
-    result = walk(job)
-    file = os.open(kept, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
-    try:
-        os.write(file, (json.dumps([key, result]) + '\n').encode())  # whole lines of all processes
-    finally:
-        os.close(file)
-    return result
-
-
 # --- statistics ----------------------------------------------------------------------------------
 
 
@@ -292,16 +239,13 @@ def _part(
     return part
 
 
-def measure(
-    floors: int, cycles: int, kept: pathlib.Path, processes: int, short: bool = False
-) -> dict[str, Any]:
-    """Walk everything and return the document that is saved; see ``--short`` for less."""
+def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
+    """Walk everything and return the document that is saved."""
     started = time.perf_counter()
-    policies = MAIN if short else POLICIES
     few = range(FIRST_SEED, FIRST_SEED + max(2, floors // 2))
     slow = [
         Job('as shipped', policy, slower, seed, cycles)
-        for slower in (() if short else reversed(SLOWER))
+        for slower in reversed(SLOWER)
         for policy in ('flat', 'dome', *(('adaptive',) if slower == 1.0 else ()))
         for seed in few
     ]
@@ -312,15 +256,16 @@ def measure(
         # On short patches the sign of the gain is not clear, so they have more floors.
         many = floors if name in HELD_OUT else max(1, floors // 2)
         many = 2 * floors if name == 'patches of 0.3 m' else many
-        for policy in policies if name in HELD_OUT else MAIN:
+        for policy in POLICIES if name in HELD_OUT else MAIN:
             jobs += [Job(name, policy, 1.0, first + k, cycles) for k in range(many)]
-    results = walked(jobs, kept, processes)
+    found = command.in_processes(walk, [(job,) for job in jobs], processes, 'policies')
+    results = dict(zip(jobs, found, strict=True))
     document: dict[str, Any] = {
         'scene': SCENE,
         'cycles': cycles,
         'rivals': {name: list(setting) for name, setting in RIVALS.items()},
         'changes': {**HELD_OUT, **AGAINST},
-        'held out': _part(HELD_OUT, policies, results),
+        'held out': _part(HELD_OUT, POLICIES, results),
         'against': _part(AGAINST, MAIN, results),
         'slower': [],
     }
@@ -336,49 +281,25 @@ def measure(
 # --- tuning --------------------------------------------------------------------------------------
 
 
-def _tuning_walk(
-    kind: str, settings: tuple[Any, ...], name: str, seed: int, cycles: int, dynamics: bool
-) -> float:
+def _tuning_walk(kind: str, settings: tuple[Any, ...], name: str, seed: int, cycles: int) -> float:
     scene, _ = ground(name, cycles)
-    first = 'oracle' if kind == 'oracle' else 'adaptive'
-    if kind == 'adaptive':
-        policy = adaptive(probe_below=settings[0])
-    elif kind == 'oracle':
-        policy = policy_named(kind, scene.floor.build(seed).wet)
-    else:
-        policy = rival(kind, settings)
-    if dynamics:
-        return _walk(scene, None, policy, first, seed).robot.body[0] / cycles
-    return quick_walk.walk(scene, policy, first, seed)[0]
+    policy = adaptive(probe_below=settings[0]) if kind == 'adaptive' else rival(kind, settings)
+    return _walk(scene, None, policy, 'adaptive', seed).robot.body[0] / cycles
 
 
-def tune(floors: int, cycles: int, processes: int, dynamics: bool) -> dict[str, Any]:
+def tune(floors: int, cycles: int, processes: int) -> dict[str, Any]:
     """Return the mean distance of every setting on the tuning grounds."""
-    given = FINAL if dynamics else SETTINGS
-    tried = [(kind, setting) for kind, settings in given.items() for setting in settings]
-    tried.append(('oracle', ()))
-    cases = [
-        (kind, setting, name, seed, cycles, dynamics)
-        for kind, setting in tried
-        for name in TUNING
-        for seed in range(floors)
-    ]
-    distances = command.in_processes(_tuning_walk, cases, processes, 'tuning')
-    each = len(TUNING) * floors
-    return {
-        'grounds': TUNING,
-        'seeds': list(range(floors)),
-        'cycles': cycles,
-        'tried': [
-            {
-                'policy': kind,
-                'settings': list(setting),
-                'mm_a_cycle': round(1e3 * statistics.fmean(distances[at : at + each]), 2),
-                'each_mm': [round(1e3 * distance, 2) for distance in distances[at : at + each]],
-            }
-            for at, (kind, setting) in zip(range(0, len(cases), each), tried, strict=True)
-        ],
-    }
+    tried = [(kind, setting) for kind, settings in SETTINGS.items() for setting in settings]
+    places = [(name, seed) for name in TUNING for seed in range(floors)]
+    cases = [(*one, *place, cycles) for one in tried for place in places]
+    walked = command.in_processes(_tuning_walk, cases, processes, 'tuning')
+    rows = []
+    for index, (kind, setting) in enumerate(tried):
+        own = [1e3 * each for each in walked[index * len(places) : (index + 1) * len(places)]]
+        row: dict[str, Any] = {'policy': kind, 'settings': list(setting)}
+        row['mm_a_cycle'] = round(statistics.fmean(own), 2)
+        rows.append(row | {'each_mm': [round(each, 2) for each in own]})
+    return {'grounds': TUNING, 'seeds': list(range(floors)), 'cycles': cycles, 'tried': rows}
 
 
 # --- tables --------------------------------------------------------------------------------------
@@ -412,103 +333,104 @@ def overall(document: Mapping[str, Any]) -> str:
     return '\n'.join(lines)
 
 
-def table(document: Mapping[str, Any]) -> str:
-    """Return all tables, by ground and of slower gaits too."""
-    lines = [overall(document)]
-    for part in ('held out', 'against'):
-        lines += ['', *_by_ground(document[part]['grounds'])]
-    return '\n'.join(lines + (_slower(document['slower']) if document['slower'] else []))
-
-
-def _by_ground(grounds: Mapping[str, Any]) -> list[str]:
-    """Return the lines of a table with a row for each ground."""
-    lines = [
-        f'| ground | floors | {" | ".join(MAIN)} | adaptive to the better fixed shape of each'
-        ' floor | to the oracle | to each 8 steps |',
-        '|' + '---|' * (len(MAIN) + 5),
-    ]
-    for name, row in grounds.items():
-        means = ' | '.join(f'{row[policy]["mm_a_cycle"]:.1f}' for policy in MAIN)
-        own, floors = row['ratios']['adaptive'], len(row['flat']['seeds'])
-        others = (own[BETTER], own['oracle'], row['ratios']['each 8 steps']['adaptive to it'])
-        # An interval over one floor says nothing.
-        ratios = [
-            interval(other) if floors > 1 else f'{other["of_means"]:.3f}' for other in others
-        ]
-        note = ' (tuned on)' if name in TUNED_ON else ''
-        lines.append(f'| {name}{note} | {floors} | {means} | {" | ".join(ratios)} |')
-    return lines
-
-
 def written(page: str, tables: str) -> str:
     """Return docs/model/policies.md with its table replaced."""
     before, rest = page.split(BEGIN)
     return f'{before}{BEGIN}\n{tables}\n{END}{rest.split(END)[1]}'
 
 
-def _slower(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the lines of the table of slower gaits."""
-    slow = {(row['policy'], row['slower']): row for row in rows}
-    lines = [
-        '',
-        f'{len(slow["flat", 1.0]["seeds"])} floors as shipped; adaptive at full speed'
-        f' {slow["adaptive", 1.0]["mm_a_cycle"]:.1f} mm a cycle:',
-        '',
-        '| gait slower by | flat mm a cycle | flat mm/s | dome mm a cycle | dome mm/s |',
-        '|---|---|---|---|---|',
-    ]
-    for slower in SLOWER:
-        cells = [
-            f'{slow[policy, slower][key]:.1f}'
-            for policy in ('flat', 'dome')
-            for key in ('mm_a_cycle', 'mm_per_s')
+# --- picture -------------------------------------------------------------------------------------
+
+_LOOKS = ((BETTER, GREEN, -0.15), ('oracle', BLUE, 0.15))
+_PARTS = {'held out': 'held out', 'against': 'little to win, or file wrong'}
+
+
+def draw(document: Mapping[str, Any]) -> Figure:
+    """Draw the adaptive policy against every other, and ground by ground.
+
+    Grounds in :data:`TUNED_ON` are hollow.
+    """
+    with rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 6.0), layout='constrained')
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.35))
+        whole = document['held out']['all']
+        pairs = [(name, row['adaptive to it']) for name, row in whole['ratios'].items()]
+        pairs = [(BETTER, whole['ratios']['adaptive'][BETTER]), *pairs]
+        pairs = [pair for pair in pairs if pair[0] != 'adaptive']
+        pairs.sort(key=lambda pair: -pair[1]['of_means'])
+        for place, (_, row) in enumerate(pairs):
+            _ratio(left, place, row, BLACK)
+        _finish(left, [name for name, _ in pairs])
+        left.set_title(f'adaptive to others, {len(whole["flat"]["seeds"])} held-out floors')
+        _by_ground(right, document)
+        handles = [
+            Line2D([], [], color=colour, marker='o', ms=4, label=f'to the {name}')
+            for name, colour, _ in _LOOKS
         ]
-        lines.append(f'| {slower:g} | ' + ' | '.join(cells) + ' |')
-    return lines
+        hollow = Line2D([], [], color=BLACK, marker='o', ls='', ms=4, mfc='white')
+        hollow.set_label('tuned on')
+        handles.append(hollow)
+        figure.legend(handles=handles, loc='outside lower right', ncols=3)
+    return figure
 
 
-def tuning_table(document: Mapping[str, Any]) -> str:
-    """Return the settings that were tried, and what they reached."""
-    lines = ['| policy | settings | mm a cycle |', '|---|---|---|']
-    for row in document['tried']:
-        settings = ', '.join(map(str, row['settings']))
-        lines.append(f'| {row["policy"]} | {settings} | {row["mm_a_cycle"]:.2f} |')
-    return '\n'.join(lines)
+def _by_ground(panel: Axes, document: Mapping[str, Any]) -> None:
+    names: list[str] = []
+    heads = []
+    for part, heading in _PARTS.items():
+        heads.append(len(names))
+        names.append(heading)
+        for name, row in document[part]['grounds'].items():
+            for other, colour, shift in _LOOKS:
+                ratio = row['ratios']['adaptive'][other]
+                _ratio(panel, len(names) + shift, ratio, colour, name in TUNED_ON)
+            names.append(f'{name} ({len(row["flat"]["seeds"])})')
+    _finish(panel, names)
+    for head in heads:
+        panel.get_yticklabels()[head].set_fontweight('bold')
+    panel.set_title('adaptive, by ground (floors; one floor has no interval)', loc='right')
+
+
+def _ratio(
+    panel: Axes, place: float, row: Mapping[str, float], colour: str, hollow: bool = False
+) -> None:
+    """Draw a ratio and its interval, which has no length where there is one floor."""
+    panel.plot([row['low'], row['high']], [place, place], color=colour, lw=1.2)
+    face = 'white' if hollow else colour
+    panel.plot(row['of_means'], place, 'o', color=colour, mfc=face, ms=4)
+
+
+def _finish(panel: Axes, names: list[str]) -> None:
+    panel.axvline(1.0, color='0.6', linewidth=0.8, zorder=0)
+    panel.set_yticks(range(len(names)), names)
+    panel.tick_params(axis='y', length=0)
+    panel.set_ylim(len(names) - 0.5, -0.5)
+    panel.set_xlabel('ratio of mean distances, 95 % interval')
 
 
 def main(words: Sequence[str]) -> int:
-    """Measure, save, and print tables."""
+    """Measure, save, and print the table."""
     parser = command.parser('policies', __doc__)
     command.add_count(
-        parser, '--floors', 4, 'floors of each ground held out, half of them elsewhere', least=1
+        parser, '--floors', 4, 'floors of each ground held out, half of them elsewhere'
     )
     command.add_count(parser, '--cycles', 60, 'gait cycles of a walk')
     parser.add_argument('--tune', action='store_true', help='try settings on tuning grounds')
-    parser.add_argument('--dynamics', action='store_true', help='in L2, with --tune')
-    parser.add_argument(
-        '--short', action='store_true',
-        help=f'walk only {", ".join(MAIN)}, at full speed',
-    )  # fmt: skip
-    parser.add_argument(
-        '--walks', type=pathlib.Path, default=command.ROOT / 'runs' / 'policies_walks.jsonl',
-        metavar='FILE', help='walks that are kept (default: runs/policies_walks.jsonl)',
-    )  # fmt: skip
     command.add_processes(parser)
     command.add_out(parser)
     options = parser.parse_args(words)
+    given = options.floors, options.cycles, options.processes
     if options.tune:
-        document = tune(options.floors, options.cycles, options.processes, options.dynamics)
-        name = 'policies_tuning_l2' if options.dynamics else 'policies_tuning'
-        document = command.write(options.out, name, document)
-        command.show(options, document, tuning_table(document))
+        document = command.write(options.out, 'policies_tuning', tune(*given))
+        lines = [
+            f'{row["policy"]} {row["settings"]}: {row["mm_a_cycle"]:.2f} mm a cycle'
+            for row in document['tried']
+        ]
+        command.show(options, document, '\n'.join(lines))
         return 0
-    document = measure(
-        options.floors, options.cycles, options.walks, options.processes, options.short
-    )
-    document = command.write(
-        options.out, 'policies', document, {'policies': draw(document, TUNED_ON)}
-    )
+    document = measure(*given)
+    document = command.write(options.out, 'policies', document, {'policies': draw(document)})
     if options.out == command.CHARTS:
         PAGE.write_text(written(PAGE.read_text(), overall(document)))
-    command.show(options, document, table(document))
+    command.show(options, document, overall(document))
     return 0

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Time that trials and nodes take, and size of their bags, beside another checkout of ros_pad.
+"""Time that trials and nodes take, beside another checkout of ros_pad.
 
 The other checkout, with its own .venv, is given by --against, and measured in turn with this one.
 Processor times are those of all threads and processes.
 
 - loop: a third of the walk without ROS, from start to report
 - trial: the walk on nodes in one process, with bag and report, from start to report
-- reading: the bag of that walk, each checkout its own, decoded to the arrays of a report
 - live: five nodes in processes of their own, in real time, with six legs
 """
 
@@ -38,9 +37,9 @@ NODES = {
 }
 """Nodes that run live, with the colour of each."""
 
-PARTS = ('loop', 'trial', 'reading', 'live')
+PARTS = ('loop', 'trial', 'live')
 WALL, PROCESSOR = 'wall time (s)', 'processor time (s)'
-SIZE, A_SAMPLE = 'size of the bag (MB)', 'processor time a sample (ms)'
+A_SAMPLE = 'processor time a sample (ms)'
 RATE, MEMORY = 'samples a second', 'memory (MB)'
 
 Result = dict[str, dict[str, dict[str, float]]]
@@ -49,14 +48,7 @@ Result = dict[str, dict[str, dict[str, float]]]
 WARM_UP = 8.0  # s, until all nodes have found one another
 _HERE = pathlib.Path(__file__).resolve().parents[2]
 
-# These run in either checkout.
-_READING = """
-import sys, time
-from ros_pad.trials.recorded import load
-wall, processor = time.perf_counter(), time.process_time()
-load(sys.argv[1])
-print(time.perf_counter() - wall, time.process_time() - processor)
-"""
+# Runs in either checkout.
 _RATE = """
 import sys
 from ros_pad.bags import BagReader
@@ -164,13 +156,6 @@ def _measured(
     if part == 'live':
         with tempfile.TemporaryDirectory(dir=folder) as own:
             return _live(checkout, pathlib.Path(own) / 'bag', options.seconds, options.rate)
-    if part == 'reading':
-        bag = folder / 'walk' / 'bag'
-        if not bag.exists():
-            _walk(checkout, bag.parent, '--cycles', options.cycles)
-        times = map(float, _printed(checkout, '-c', _READING, bag).split())
-        size = sum(each.stat().st_size for each in bag.iterdir())
-        return dict(zip((WALL, PROCESSOR), times, strict=True)) | {SIZE: 1e-6 * size}
     short = part == 'loop'
     words = ['--cycles', max(1, options.cycles // 3) if short else options.cycles]
     with tempfile.TemporaryDirectory(dir=folder) as own:
@@ -199,17 +184,12 @@ def measure(options: argparse.Namespace, folder: pathlib.Path) -> Result:
 
 
 def table(result: Result) -> str:
-    """Return the medians as text, those of the other checkout and their ratio beside them."""
-    lines = []
-    for part, rows in result.items():
-        heads = [*rows, *(('ratio',) if 'before' in rows else ())]
-        lines.append(f'{part:32}' + ''.join(f'{head:>10}' for head in heads))
-        for key, now in rows['now'].items():
-            values = [row[key] for row in rows.values()]
-            if 'before' in rows:
-                values.append(now / values[0])
-            lines.append(f'  {key:30}' + ''.join(f'{value:10.4g}' for value in values))
-    return '\n'.join(lines)
+    """Return the medians as text."""
+    return command.listed([
+        {'part': part, 'checkout': name, **row}
+        for part, rows in result.items()
+        for name, row in rows.items()
+    ])  # fmt: skip
 
 
 def chart(rows: dict[str, dict[str, float]]) -> Figure:

@@ -29,11 +29,12 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from ros_pad.bags import topics
 from ros_pad.bags.wire import Wire
 from ros_pad.commands.progress import bar
-from ros_pad.nodes import topics
-from ros_pad.nodes.messages import Messages
-from ros_pad.records import COMMAND, Block
+from ros_pad.nodes import qos
+from ros_pad.nodes.parameters import LEGS
+from ros_pad.records import COMMAND, PRESSURE, Block
 from studies import command
 from studies.machine import memory, processor_time
 
@@ -91,7 +92,7 @@ def flood(kind: str, rate: float) -> None:
     """Publish one kind of flood for one leg until standard input ends; print the rate, 1/s."""
     rclpy.init()
     node = Node('flood', start_parameter_services=False, enable_rosout=False)
-    publisher = topics.COMMAND.publisher(node)
+    publisher = qos.publisher(node, topics.COMMAND)
     gauges = {'valid': [GAUGE], 'invalid': [1e9], 'mixed': [GAUGE, 1e9]}.get(kind, [])
     messages = [b'\0\1\0\0' + b'\1' * 9]
     os.set_blocking(sys.stdin.fileno(), False)
@@ -114,9 +115,9 @@ def flood(kind: str, rate: float) -> None:
 
 def _command(legs: Sequence[int], gauge: float) -> bytes:
     """Return the message of a record of this time with set-points, Pa, for some legs."""
-    rows = COMMAND.rows(len(topics.LEGS))
-    rows['setpoint'][[leg in legs for leg in topics.LEGS]] = gauge
-    return Wire(COMMAND, topics.LEGS).encode(Block.of(time.time_ns(), rows))
+    rows = COMMAND.rows(len(LEGS.default))
+    rows['setpoint'][[leg in legs for leg in LEGS.default]] = gauge
+    return Wire(COMMAND, LEGS.default).encode(Block.of(time.time_ns(), rows))
 
 
 @contextlib.contextmanager
@@ -139,11 +140,14 @@ class Commander:
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.legs = [leg for leg in legs if leg != FLOODED]
-        self._publisher = topics.COMMAND.publisher(self.node)
+        self._publisher = qos.publisher(self.node, topics.COMMAND)
         self.gauges = dict.fromkeys(legs, 0.0)
         self.count = self.diagnostics = 0
-        Messages(self.node).receive_record(topics.PRESSURE, legs, self._receive)
-        topics.DIAGNOSTICS.subscription(self.node, self._count)
+        decode = Wire(PRESSURE, legs).decode
+        qos.subscription(
+            self.node, topics.PRESSURE, lambda data: self._receive(decode(data)), raw=True
+        )
+        qos.subscription(self.node, topics.DIAGNOSTICS, self._count)
 
     def _receive(self, block: Block) -> None:
         pressures = block.rows[-1]['pressure'].tolist()
@@ -240,7 +244,7 @@ def run(
             _process(*node, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as regulator,
             contextlib.ExitStack() as stack,
         ):
-            commander = Commander(topics.LEGS)
+            commander = Commander(LEGS.default)
             commander.until(commander.connected, PATIENCE, 'the regulator node')
             flooder = None
             if kind != 'none':
@@ -274,21 +278,6 @@ def run(
     return result
 
 
-def table(results: Sequence[Result]) -> str:
-    """Return the results as text."""
-    lines = [
-        'flood       records/s  vent after (s)  flooded pad  pressures/s  diagnostics/s'
-        '  growth (MB)  processor'
-    ]
-    for each in results:
-        lines.append(
-            f'{each.kind:8} {each.rate:12.0f} {each.reaction:15.3f}'
-            f'  {"up" if each.flooded_up else "vented":>11} {each.pressures:12.1f}'
-            f' {each.diagnostics:14.1f} {each.growth:12.1f} {each.processor:9.0%}'
-        )
-    return '\n'.join(lines)
-
-
 def main(words: Sequence[str]) -> int:
     """Flood with every kind; return the exit status."""
     parser = command.parser('flood', __doc__)
@@ -307,7 +296,8 @@ def main(words: Sequence[str]) -> int:
     for kind in options.kinds:
         with bar(f'flood: {kind}', options.rounds, 'round') as reach:
             results.append(run(kind, options.rounds, options.rate, reach))
-    command.show(options, [dataclasses.asdict(each) for each in results], table(results))
+    kept = [dataclasses.asdict(each) for each in results]
+    command.show(options, kept, command.listed(kept))
     late = [each.kind for each in results if each.reaction > TIMEOUT + LATEST]
     if late:
         print(

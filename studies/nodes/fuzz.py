@@ -15,6 +15,7 @@ from __future__ import annotations
 import array
 import contextlib
 import dataclasses
+import functools
 import importlib
 import io
 import math
@@ -45,7 +46,7 @@ WATCHED = (
 LONGEST = 4096
 """Largest size of an input, bytes; twice the size of the longest seed if that is more."""
 
-REPLY = 256  # largest number of bytes of a reply: ros_pad.regulators.transport.LONGEST_REPLY
+REPLY = 256  # largest number of bytes of a reply: ros_pad.regulators.serial_device.LONGEST_REPLY
 
 
 @contextlib.contextmanager
@@ -81,17 +82,13 @@ class Target:
             self.feed(data)
 
 
-def _device(backend: str, seeds: list[bytes], **options: Any) -> Target:
+def _device(backend: str) -> Target:
     """Return a target that identifies, sets and polls a device; replies are the lines of the data.
 
     As from a real device, a reply is ASCII, stripped, and at most :data:`REPLY` bytes long.
     """
-    module, name = {
-        'alicat': ('alicat', 'AlicatRegulator'),
-        'smc_itv': ('smc_itv', 'SmcItvRegulator'),
-        'serial_text': ('serial_text', 'SerialTextRegulator'),
-    }[backend]
-    kind = getattr(importlib.import_module(f'ros_pad.regulators.{module}'), name)
+    name, options, seeds = _DEVICES[backend]
+    kind = getattr(importlib.import_module(f'ros_pad.regulators.{backend}'), name)
 
     def feed(data: bytes) -> None:
         regulator = kind(port='fuzz', **options)
@@ -117,19 +114,6 @@ def _device(backend: str, seeds: list[bytes], **options: Any) -> Target:
             check(frame or regulator.poll(ask))
 
     return Target(feed, seeds)
-
-
-def _template(data: bytes) -> None:
-    """Make a regulator from three templates, and read a reply with it; one line of data each."""
-    from ros_pad.regulators.serial_text import SerialTextRegulator
-
-    texts = [*data.decode('utf-8', 'replace').split('\n'), '', '', '']
-    regulator = SerialTextRegulator(
-        'fuzz', set_template=texts[0], read_reply=texts[1], set_reply=texts[2]
-    )
-    frame = regulator.poll(lambda command, reply=True: texts[3][:REPLY])
-    if not math.isfinite(frame.pressure):
-        raise AssertionError(f'serial_text: pressure in {frame} must be finite')
 
 
 def _fault(data: bytes) -> None:
@@ -160,11 +144,6 @@ def _read_bag(path: pathlib.Path) -> None:
             pass
 
 
-def _read_metadata(path: pathlib.Path) -> None:
-    (path.parent / 'bag_0.mcap').write_bytes(_bag())
-    _read_bag(path.parent)
-
-
 def _bag(chunked: bool = True) -> bytes:
     """Return a small bag without checksums and compression, which random changes would break."""
     from mcap.writer import CompressionType, Writer
@@ -174,64 +153,34 @@ def _bag(chunked: bool = True) -> bytes:
         stream, compression=CompressionType.NONE, enable_crcs=False, use_chunking=chunked
     )
     writer.start(profile='ros2')
-    definition = b'std_msgs/Header header\nfloat64[] values\n' + b'=' * 80 + (
-        b'\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n' + b'=' * 80
-    ) + b'\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n'  # fmt: skip
-    for name, text, data in (
-        ('std_msgs/msg/Float64', b'float64 data\n', bytes(12)),
-        (
-            'test_msgs/msg/Values', definition,
-            b'\0\1\0\0' + bytes(8) + b'\2\0\0\0a\0\0\0\1\0\0\0' + bytes(12),
-        ),
-    ):  # fmt: skip
-        schema = writer.register_schema(name, 'ros2msg', text)
-        channel = writer.register_channel(f'/{name[-6:]}', 'cdr', schema)
-        for time in (1, 2):
-            writer.add_message(channel, time, data, time)
+    schema = writer.register_schema('std_msgs/msg/Float64', 'ros2msg', b'float64 data\n')
+    channel = writer.register_channel('/value', 'cdr', schema)
+    for time in (1, 2):
+        writer.add_message(channel, time, bytes(12), time)
     writer.finish()
     return stream.getvalue()
 
 
-_METADATA = b"""rosbag2_bagfile_information:
-  version: 9
-  storage_identifier: mcap
-  compression_mode: ''
-  relative_file_paths: [bag_0.mcap]
-  custom_data: {scene: leg_dry_flat}
-"""
-
-
-def _alicat() -> Target:
-    frames = b'A +014.70 +000.00\n'
-    return _device('alicat', [
-        frames + b'A 8v17.0-R23\n' + frames * 4,
-        frames + b'A 10v05.0-R24\nA 12 kPaG\nA S\n' + frames * 4,
-        b'A +1 +0 HLD LCK\nA 9v00\nA 7 psi\n' + b'A +1 +0 OPL EXH\nA ?\n?\n' * 3,
-    ])  # fmt: skip
-
-
-def _smc_itv() -> Target:
-    seeds = [
-        b'0\n12\n0\n0\n12\n512\n512\n510\n921\n921\n920',
-        b'UNKNOWN COMMAND\n',
-        b'1023\n1024\n-1\n',
-    ]
-    return _device('smc_itv', seeds, full_scale=100e3)
-
-
-def _serial_text() -> Target:
-    seeds = [
-        b'1 1.0\nOK 1 0.000\n1 1.0\nOK 1 2.500\n1 3.0\nOK 1 4.500\n1 4.6\n',
-        b'1 -1.25e+1\nOK 1 .5E-3\n',
-    ]
-    return _device('serial_text', seeds)
-
-
-def _templates() -> Target:
-    return Target(_template, [
-        b'SET {channel} {value:.3f}\n{channel} {value}\nOK {channel} {value}\n1 2.5',
-        b'V{value:d}\nP{value}Pa\n\nP-1e3Pa',
-    ])  # fmt: skip
+_DEVICES: dict[str, tuple[str, dict[str, Any], list[bytes]]] = {
+    'alicat': (
+        'AlicatRegulator',
+        {},
+        [
+            b'A +014.70 +000.00\nA 8v17.0-R23\n' + b'A +014.70 +000.00\n' * 4,
+            b'A +1 +0 HLD LCK\nA 9v00\nA 7 psi\n' + b'A +1 +0 OPL EXH\nA ?\n?\n' * 3,
+        ],
+    ),
+    'smc_itv': (
+        'SmcItvRegulator',
+        {'full_scale': 100e3},
+        [b'0\n12\n0\n0\n12\n512\n512\n510\n921\n921\n920', b'UNKNOWN COMMAND\n'],
+    ),
+    'serial_text': (
+        'SerialTextRegulator',
+        {},
+        [b'1 1.0\nOK 1 0.000\n1 1.0\nOK 1 2.500\n1 3.0\nOK 1 4.500\n1 4.6\n'],
+    ),
+}
 
 
 def _faults() -> Target:
@@ -249,12 +198,6 @@ def _shipped(folder: str) -> list[bytes]:
     from ros_pad.configuration import shared_folder
 
     return [path.read_bytes() for path in sorted((shared_folder() / folder).glob('*.yaml'))]
-
-
-def _feet() -> Target:
-    with _watched_imports():
-        from ros_pad.contact.resistance import Foot
-    return Target(_file(Foot.load, 'foot.yaml'), _shipped('feet'))
 
 
 def _scenes() -> Target:
@@ -365,20 +308,11 @@ def _records() -> Target:
     )
 
 
-def _metadata() -> Target:
-    return Target(_file(_read_metadata, 'metadata.yaml'), [_METADATA])
-
-
 TARGETS: dict[str, Callable[[], Target]] = {
-    'alicat': _alicat,
-    'smc_itv': _smc_itv,
-    'serial_text': _serial_text,
-    'templates': _templates,
+    **{name: functools.partial(_device, name) for name in _DEVICES},
     'faults': _faults,
-    'feet': _feet,
     'scenes': _scenes,
     'bags': _bags,
-    'metadata': _metadata,
     'fields': _fields,
     'records': _records,
 }

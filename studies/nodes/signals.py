@@ -39,12 +39,13 @@ from collections.abc import Callable, Iterator, Sequence
 import rclpy
 from rclpy.node import Node
 
-from ros_pad.bags import BagReader
+from ros_pad.bags import BagReader, topics
 from ros_pad.bags.wire import Wire
 from ros_pad.commands.progress import bar
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import BagError
-from ros_pad.nodes import topics
+from ros_pad.nodes import qos
+from ros_pad.nodes.parameters import LEGS
 from ros_pad.records import COMMAND, PRESSURE, Block
 from ros_pad.regulators.emulate import AlicatEmulator, Emulator
 from studies import command
@@ -203,13 +204,13 @@ class Commander:
     def __enter__(self) -> None:
         rclpy.init(args=[])
         self._node = Node('commander', start_parameter_services=False, enable_rosout=False)
-        self._publisher = topics.COMMAND.publisher(self._node)
+        self._publisher = qos.publisher(self._node, topics.COMMAND)
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._publish, daemon=True)
         self._thread.start()
 
     def _publish(self) -> None:
-        wire, rows = Wire(COMMAND, topics.LEGS), COMMAND.rows(len(topics.LEGS))
+        wire, rows = Wire(COMMAND, LEGS.default), COMMAND.rows(len(LEGS.default))
         rows['setpoint'] = GAUGE
         while not self._end.wait(0.02):
             self._publisher.publish(wire.encode(Block.of(time.time_ns(), rows)))
@@ -334,19 +335,20 @@ def run(target: str, repeats: int, work: float, seed: int = 0) -> Iterator[Try]:
 
 
 def table(tries: Sequence[Try]) -> str:
-    """Return the results as text."""
-    lines = [
-        'target      tries  good  status 0  bag or pressure  Python starts (s)  longest end (s)'
-    ]
+    """Return the results as text, a line for each target."""
+    rows = []
     for target in dict.fromkeys(one.target for one in tries):
         own = [one for one in tries if one.target == target]
-        good = sum(not one.problems for one in own)
-        lines.append(
-            f'{target:10} {len(own):6} {good:5} {sum(0 in one.statuses for one in own):9}'
-            f' {sum(one.reached for one in own):16}'
-            f' {max(one.python for one in own):18.2f} {max(one.ending for one in own):16.2f}'
-        )
-    return '\n'.join(lines)
+        rows.append({
+            'target': target,
+            'tries': len(own),
+            'good': sum(not one.problems for one in own),
+            'status 0': sum(0 in one.statuses for one in own),
+            'bag or pressure': sum(one.reached for one in own),
+            'Python starts (s)': max(one.python for one in own),
+            'longest end (s)': max(one.ending for one in own),
+        })  # fmt: skip
+    return command.listed(rows)
 
 
 def _perform_all(target: str, repeats: int, seed: int, tries: list[Try]) -> None:

@@ -7,8 +7,8 @@ https://github.com/ami-iit/paper_ramadoss-2022-iros-humanoid-base-estimation (BS
 h5py), and from https://github.com/mrsp/serow (GPL-3.0) evaluation/unit_tests/data/go1.csv,
 urdf/go1.urdf, and test/data/go1_odom.csv of commit 9201120.
 
-The estimator runs beside the rivals of the study sensing, and with a radius of the feet or a
-length of the legs that are fixed to those of the file. Cameras saw the base, with a clock of
+The estimator runs beside the rivals of the study sensing, and with feet and legs whose size is
+fixed to that of the file. Cameras saw the base, with a clock of
 their own (without times on the Go1): its offset, and its rate where unknown, are those at which
 the heading by the gyro is the one that the cameras saw. The truth about slip is not known: feet of
 the iCub should stick. Velocities of the cameras are means over 0.2 s, and so are those compared.
@@ -28,22 +28,17 @@ from scipy import optimize
 from ros_pad.errors import InvalidInput
 from ros_pad.robots.rotation import Array, rotation
 from studies import command
-from studies.samples import Flags, runs
+from studies.samples import Flags
 from studies.sensing import recordings
 from studies.sensing.methods import METHODS as RIVALS
-from studies.sensing.methods import Track, estimated, estimator_for, readings, track_of
+from studies.sensing.methods import Track, estimated, track_of
 from studies.sensing.recordings import Recording
-from studies.sensing.rivals import loads_of
 from studies.sensing.study import alarms_of, settled
 from studies.sensing.walks import Course, Log
 
-FIXED = {
-    'fixed size': {'radius_error': 0.0, 'length_error': 0.0},
-    'fixed length': {'length_error': 0.0},
-    'fixed radius': {'radius_error': 0.0},
-}
-METHODS = (RIVALS[0], *FIXED, *RIVALS[1:])
-"""Methods of the study sensing, and the estimator with what it does not learn of the robot."""
+FIXED = 'fixed size'
+METHODS = (RIVALS[0], FIXED, *RIVALS[1:])
+"""Methods of the study sensing, and the estimator that learns nothing of the robot's size."""
 
 MEAN = 0.2
 """Time over which velocities of the body are averaged, s."""
@@ -58,9 +53,6 @@ OFFSETS = np.arange(-3.0, 3.0, 0.05)
 RATES = np.arange(40.0, 80.0, 0.25)
 """Rates that are tried where that of the cameras is not known, Hz."""
 
-FEWEST = 7
-"""Least number of poses of a stance; two at either end are not used."""
-
 SHARED = 0.85
 """Least share of the poses that must lie within the readings."""
 
@@ -74,12 +66,8 @@ class Row:
     readings: int
     duration: float
     path: float
-    speed: float  # of the base, rms
     clock: tuple[float, float]  # start, s, and rate, Hz, of the cameras' clock
-    wander: float  # of feet that stand, by cameras and joints, from their mean place, rms
     position_error: float
-    drift: float
-    scale: float  # estimated distance over that of the cameras
     velocity_error: float
     coverage: float  # share of velocity errors within 2 deviations
     slip_median: float
@@ -89,7 +77,6 @@ class Row:
     alarms: int
     minutes: float  # of settled stance, walking
     doubt: float
-    learnt: tuple[float, float]  # by the estimator: radius, m, relative error of the legs' length
 
 
 def log_of(recording: Recording) -> Log:
@@ -193,61 +180,29 @@ def measure(recording: Recording) -> list[Row]:
     if not fast.size:
         raise InvalidInput(f'{recording.name}: cameras saw no speed above {WALKS} m/s')
     walks = (time >= fast[0]) & (time <= fast[-1])
-    wandering, size = wander(recording, inside, at), learnt(recording)
     rows = []
     for method in METHODS:
+        fixed = {'radius_error': 0.0, 'length_error': 0.0}
         track = (
-            estimated(recording.robot, log, course, **FIXED[method])
-            if method in FIXED
+            estimated(recording.robot, log, course, **fixed)
+            if method == FIXED
             else track_of(recording.robot, log, course, method)
         )
         places = turned(_at(at, time, track.position), seen)
         mean = (places[apart:] - places[:-apart]) * rate / apart
         error = (mean - velocity)[:, :2]
         deviation = _at(at, time, track.deviation)[apart // 2 :][: len(error)]
-        distance = float(np.linalg.norm(mean[:, :2], axis=1).sum() / rate)
         rows.append(
             Row(
                 *(recording.name, method, len(time), float(time[-1]), path),
-                learnt=size,
-                speed=rms(velocity[:, :2]),
                 clock=(start, rate),
-                wander=wandering,
                 position_error=rms((places - seen)[:, :2]),
-                drift=float(np.linalg.norm((places[-1] - places[0] - seen[-1] + seen[0])[:2])),
-                scale=distance / path,
                 velocity_error=rms(error),
                 coverage=_share(np.abs(error) / deviation),
                 **slips(track, recording.rate, walks),
             )
         )
     return rows
-
-
-def wander(recording: Recording, inside: Flags, at: Array) -> float:
-    """Return how far feet that stand are from their mean place, by cameras and joints, rms, m."""
-    robot = recording.robot
-    time = np.arange(len(recording.gyro)) / recording.rate
-    places = [robot.foot_positions(q) for q in _at(at, time, recording.joint_positions)]
-    feet = np.einsum('nij,nlj->nli', recording.seen_turn[inside], np.array(places))
-    feet += recording.seen_position[inside][:, None]
-    stands = loads_of(robot, log_of(recording))[np.round(at * recording.rate).astype(int)]
-    away = [
-        feet[begin + 2 : end - 2, leg, :2] - feet[begin + 2 : end - 2, leg, :2].mean(0)
-        for leg in range(stands.shape[1])
-        for begin, end in runs(stands[:, leg])
-        if end - begin >= FEWEST
-    ]
-    return rms(np.concatenate(away))
-
-
-def learnt(recording: Recording) -> tuple[float, float]:
-    """Return radius of the feet, m, and relative error of the legs' length, as learnt."""
-    course = Course(rate=recording.rate, noise=recording.noise)
-    estimator = estimator_for(recording.robot, course)
-    for row in readings(log_of(recording)):
-        estimator.update(*row)
-    return estimator.foot_radius[0], estimator.length_error[0]
 
 
 def alarms(track: Track, rate: float) -> Flags:
@@ -294,38 +249,6 @@ def _at(at: Array, time: Array, columns: Array) -> Array:
     return np.stack([np.interp(at, time, column) for column in columns.T], axis=1)
 
 
-def table(rows: Sequence[Row]) -> str:
-    """Return the figures as a table."""
-    lines = [
-        'Position: error x y, rms, heading and place fitted; drift: at the end; scale: distance'
-        ' over that of the cameras;\nv: error of velocity x y over 0.2 s, rms; in 2 sd: share of'
-        ' errors of v / of slips around zero; slip: speed of\nfeet that stand, median and 95 %;'
-        ' flag: share of their samples with slipping; alarms: a minute of settled stance,\n'
-        'for slip in any of four directions. Slips are those while the robot walks.',
-        'robot  method         position  drift, mm  scale  v, mm/s  in 2 sd    slip, mm/s'
-        '   flag %  alarms   doubt %',
-    ]
-    for name in dict.fromkeys(row.recording for row in rows):
-        some = [row for row in rows if row.recording == name]
-        first = some[0]
-        lines.append(
-            f'{name}: {first.readings} readings, {first.duration:.1f} s, path {first.path:.2f} m,'
-            f' speed rms {1e3 * first.speed:.0f} mm/s, {first.minutes:.2f} min of settled stance;'
-            f'\n  cameras from {first.clock[0]:.3f} s at {first.clock[1]:.2f} Hz; by them, feet'
-            f' wander {1e3 * first.wander:.1f} mm rms in stance'
-            f'\n  learnt: radius {1e3 * first.learnt[0]:.1f} mm, length of the legs'
-            f' {1e2 * first.learnt[1]:+.1f} %'
-        )
-        lines += [
-            f'{name:6} {row.method:14} {1e3 * row.position_error:8.0f} {1e3 * row.drift:10.0f}'
-            f' {row.scale:6.3f} {1e3 * row.velocity_error:8.1f}  {row.coverage:.2f}'
-            f'/{row.slip_coverage:.2f} {1e3 * row.slip_median:7.1f} {1e3 * row.slip_most:7.1f}'
-            f' {1e2 * row.flagged:7.1f} {row.alarms / row.minutes:8.1f} {1e2 * row.doubt:8.1f}'
-            for row in some
-        ]
-    return '\n'.join(lines)
-
-
 def main(words: Sequence[str]) -> int:
     """Measure, and print the table; return the exit status."""
     part = command.parser('foreign', __doc__)
@@ -344,5 +267,6 @@ def main(words: Sequence[str]) -> int:
         raise InvalidInput(f'a folder is needed: {sources}')
     found = [read(folder) for read, folder in folders]
     rows = [row for each in command.each(found, 'foreign', 'robot') for row in measure(each)]
-    command.show(options, [dataclasses.asdict(row) for row in rows], table(rows))
+    kept = [dataclasses.asdict(row) for row in rows]
+    command.show(options, kept, command.listed(kept))
     return 0

@@ -22,94 +22,17 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from studies.sensing.walks import Course, Log, walk
 
-RULE = '\n' + '=' * 80 + '\n'
-TIME = 'MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec'
-HEADER = f'MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id{RULE}{TIME}'
-UNITREE_IMU = (
-    'MSG: unitree_go/IMUState\nfloat32[4] quaternion\nfloat32[3] gyroscope\n'
-    'float32[3] accelerometer\nfloat32[3] rpy\nint8 temperature'
-)
-VECTOR = 'MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z'
+_TEXT = pathlib.Path(__file__).with_suffix('.msg').read_text('utf-8')
 DEFINITIONS = {
-    'sensor_msgs/msg/Imu': RULE.join(
-        (
-            'std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n'
-            'float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n'
-            'float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\n'
-            'float64[9] linear_acceleration_covariance',
-            'MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w',
-            VECTOR,
-            HEADER,
-        )
-    ),
-    'sensor_msgs/msg/JointState': RULE.join(
-        (
-            'std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n'
-            'float64[] effort',
-            HEADER,
-        )
-    ),
-    'geometry_msgs/msg/WrenchStamped': RULE.join(
-        (
-            'std_msgs/Header header\ngeometry_msgs/Wrench wrench',
-            'MSG: geometry_msgs/Wrench\ngeometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque',
-            VECTOR,
-            HEADER,
-        )
-    ),
-    'unitree_go/msg/LowState': RULE.join(
-        (
-            'uint8[2] head\nuint8 level_flag\nuint8 frame_reserve\nuint32[2] sn\n'
-            'uint32[2] version\nuint16 bandwidth\nIMUState imu_state\n'
-            'MotorState[20] motor_state\nBmsState bms_state\nint16[4] foot_force\n'
-            'int16[4] foot_force_est\nuint32 tick\nuint8[40] wireless_remote\nuint8 bit_flag\n'
-            'float32 adc_reel\nint8 temperature_ntc1\nint8 temperature_ntc2\nfloat32 power_v\n'
-            'float32 power_a\nuint16[4] fan_frequency\nuint32 reserve\nuint32 crc',
-            UNITREE_IMU,
-            'MSG: unitree_go/MotorState\nuint8 mode\nfloat32 q\nfloat32 dq\nfloat32 ddq\n'
-            'float32 tau_est\nfloat32 q_raw\nfloat32 dq_raw\nfloat32 ddq_raw\n'
-            'int8 temperature\nuint32 lost\nuint32[2] reserve',
-            'MSG: unitree_go/BmsState\nuint8 version_high\nuint8 version_low\nuint8 status\n'
-            'uint8 soc\nint32 current\nuint16 cycle\nint8[2] bq_ntc\nint8[2] mcu_ntc\n'
-            'uint16[15] cell_vol',
-        )
-    ),
-    'unitree_go/msg/SportModeState': RULE.join(
-        (
-            'TimeSpec stamp\nuint32 error_code\nIMUState imu_state\nuint8 mode\n'
-            'float32 progress\nuint8 gait_type\nfloat32 foot_raise_height\nfloat32[3] position\n'
-            'float32 body_height\nfloat32[3] velocity\nfloat32 yaw_speed\n'
-            'float32[4] range_obstacle\nint16[4] foot_force\nfloat32[12] foot_position_body\n'
-            'float32[12] foot_speed_body',
-            'MSG: unitree_go/TimeSpec\nint32 sec\nuint32 nanosec',
-            UNITREE_IMU,
-        )
-    ),
-    'spot_msgs/msg/FootStateArray': RULE.join(
-        (
-            'FootState[] states',
-            'MSG: spot_msgs/FootState\ngeometry_msgs/Point foot_position_rt_body\nuint8 contact',
-            'MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z',
-        )
-    ),
-    'champ_msgs/msg/ContactsStamped': f'std_msgs/Header header\nbool[] contacts{RULE}{HEADER}',
-    'anymal_msgs/msg/AnymalState': RULE.join(
-        (
-            'std_msgs/Header header\nint8 state\nany_msgs/ExtendedJointState joints\n'
-            'Contact[] contacts',
-            'MSG: any_msgs/ExtendedJointState\nstd_msgs/Header header\nstring[] name\n'
-            'float64[] position\nfloat64[] velocity\nfloat64[] acceleration\nfloat64[] effort',
-            'MSG: anymal_msgs/Contact\nstd_msgs/Header header\nstring name\nuint8 state\n'
-            'geometry_msgs/Vector3 normal',
-            VECTOR,
-            HEADER,
-        )
-    ),
+    name: text.rstrip('\n')
+    for name, _, text in (
+        part.partition('\n')
+        for part in (pathlib.Path(__file__).with_suffix('.msg').read_text('utf-8')).split('>>> ')[
+            1:
+        ]
+    )
 }
-"""Layouts of messages, by type; that of AnymalState without pose, twist and transforms."""
-
-START = 1_700_000_000_000_000_000  # ns, of every bag
-
+"""Layouts of messages, by type, of layouts.msg."""
 
 START = 1_700_000_000_000_000_000  # ns, first stamp of every bag
 GO2_MOTORS = ('FR', 'FL', 'RR', 'RL')

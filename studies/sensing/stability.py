@@ -39,9 +39,7 @@ COURSE = Course(rate=float(RATES[0]))
 USUAL = 250  # Hz
 EDGES = np.unique(
     np.r_[
-        0,
-        np.geomspace(2.0, USUAL * LONGEST, 90),
-        np.geomspace(USUAL * LONGEST, USUAL * AFTER, 20),
+        0, np.geomspace(2.0, USUAL * LONGEST, 90), np.geomspace(USUAL * LONGEST, USUAL * AFTER, 20)
     ].astype(int)
 )  # samples between which errors are averaged
 UNLOADED = 1.0  # N
@@ -280,39 +278,12 @@ def first(curve: Curve, values: Sequence[float], limit: float) -> float:
     return next((x for x, value in zip(curve.x, values, strict=True) if value > limit), math.nan)
 
 
-POINTS = {'feet slide for long': range(6), 'low rates': RATES}
 UNITS = {'feet slide for long': 'feet', 'low rates': 'Hz'}
-TIMES = (0.05, 0.1, 0.2, 0.4, 1.0, 2.0, 2.9)  # s
-
-
-def table(found: Sequence[Curve]) -> str:
-    """Return errors at some points, and where each method diverges, as a table."""
-    lines = []
-    for curve in found:
-        points = [float(x) for x in POINTS.get(curve.case, TIMES)]
-        if curve.method == 'law':
-            lines.append(f'\n{curve.case}: error of v x y, mm/s, at')
-            head = ''.join(f'{x:8.3g}' for x in points)
-            lines.append(
-                f'{"":15}{head}  above {1e3 * LIMIT:.0f} from  in doubt from  silent from'
-            )
-        order = np.argsort(curve.x)
-        errors = np.interp(points, np.array(curve.x)[order], np.array(curve.error)[order])
-        shown = ''.join(f'{1e3 * error:8.1f}' for error in errors)
-        line = f'{curve.method:15}{shown}  {first(curve, curve.error, LIMIT):14.3g}'
-        if curve.method != 'law':
-            line += f'  {first(curve, curve.doubt, 0.5):13.3g}'
-            line += f'  {first(curve, curve.silent, 0.5):11.3g}'
-        lines.append(line)
-    return '\n'.join(lines)
 
 
 def summary(found: Sequence[Curve]) -> str:
     """Return where each method diverges, is in doubt and is wrong without a doubt, in Markdown."""
-    lines = [
-        '| case | ' + ' | '.join(('law', *METHODS)) + ' |',
-        '|---' * (len(METHODS) + 2) + '|',
-    ]
+    lines = ['| case | ' + ' | '.join(('law', *METHODS)) + ' |', '|---' * (len(METHODS) + 2) + '|']
     for case in dict.fromkeys(curve.case for curve in found):
         curves = [curve for curve in found if curve.case == case]
         cells = [f'{case}, {UNITS.get(case, "s")}', *map(_limits, curves)]

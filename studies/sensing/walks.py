@@ -18,7 +18,6 @@ REST = 2.0  # s at rest before the walk
 GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
 SETTLE = 1.0  # s before the log, in which the robot comes to rest on its feet
 RAMP = 1.0  # s until the full stride
-FLOORS = ('dry', 'patches', 'ice')
 PATCH = 0.4  # m, edge of the squares of a floor
 START_FRICTION = 0.7  # of the ground at rest
 POINT = 1e-4  # m, radius of the ball that stands for a foot that does not roll
@@ -69,18 +68,12 @@ class Course:
         Name of a gait; the robot's own where it is empty.
     period, duty : float
         Of that gait, s and share; those of the robot's own where they are 0.
-    slope : float
-        Slope of the floor, uphill, rad.
-    turn : float
-        Rate with which the robot turns, rad/s.
     lean : float
         Shift of the body away from a foot that swings, over the distance of that foot.
     pace : float
         Factor on the robot's usual speed.
     rate : float
         Samples a second, Hz.
-    soft : float
-        Time constant of the contacts, s: soft feet sink in, and creep.
     noise : Noise
     delay : float
         Time by which joints and forces are later than the IMU, s; less than 20 ms.
@@ -92,12 +85,9 @@ class Course:
     gait: str = ''
     period: float = 0.0
     duty: float = 0.0
-    slope: float = 0.0
-    turn: float = 0.0
     lean: float = 0.0
     pace: float = 1.0
     rate: float = RATE
-    soft: float = 0.02
     noise: Noise = field(default_factory=Noise)
     delay: float = 0.0
 
@@ -173,8 +163,8 @@ def model_of(robot: Robot, course: Course) -> str:
     return f"""
 <mujoco>
   <option timestep="{1.0 / course.rate / SUBSTEPS}" integrator="implicitfast" cone="elliptic"
-          impratio="100" gravity="{words(GRAVITY @ _level(course))}"/>
-  <default><geom contype="0" conaffinity="0"/><pair solref="{course.soft} 1"/></default>
+          impratio="100" gravity="{words(GRAVITY)}"/>
+  <default><geom contype="0" conaffinity="0"/><pair solref="0.02 1"/></default>
   <worldbody>{planes}
     <body name="base"><freejoint/>
       <inertial mass="{trunk!r}" pos="0 0 0" diaginertia="{roll} {pitch} {yaw}"/>
@@ -186,11 +176,6 @@ def model_of(robot: Robot, course: Course) -> str:
   <sensor><gyro site="imu"/></sensor>
 </mujoco>
 """
-
-
-def _level(course: Course) -> Array:
-    """Return the rotation from the axes of the floor to those with z up."""
-    return from_rpy((0.0, -course.slope, 0.0))
 
 
 class Floor:
@@ -272,11 +257,9 @@ def walk(course: Course, seed: int, duration: float) -> Log:
     model: Any = mujoco.MjModel.from_xml_string(model_of(robot, course))
     data: Any = mujoco.MjData(model)
     home = robot.foot_positions(robot.home)
-    home[:, 0] += home[:, 2] * np.tan(course.slope)  # the centre of mass is over their middle
     q = robot.joint_positions(home)
-    # Feet that stand on the ground go backwards under the body, and round it.
-    velocity = course.turn * np.stack([-home[:, 1], home[:, 0]], axis=1)
-    velocity[:, 0] += course.pace * drive.speed
+    # Feet that stand on the ground go backwards under the body.
+    velocity = np.tile((course.pace * drive.speed, 0.0), (len(home), 1))
     aim = q.ravel()
     data.qpos[2] = -home[:, 2].mean() + (robot.foot_radius or POINT)
     data.qpos[7:] = data.ctrl[:] = aim
@@ -317,20 +300,17 @@ def walk(course: Course, seed: int, duration: float) -> Log:
         rows['accelerometer'].append(_specific_force(robot, model, rows, acceleration))
         rows['time'].append(time)
     log = Log(**{key: np.array(value) for key, value in rows.items()})
-    return _noisy(delayed(_levelled(log, course), course.delay), generator, course.noise)
+    return _noisy(delayed(_levelled(log), course.delay), generator, course.noise)
 
 
-def _levelled(log: Log, course: Course) -> Log:
-    """Return a log whose truth is in axes with z up, x along the first heading."""
-    x, y, z, w = log.orientation[0]
-    first = _level(course) @ matrix((x, y, z, w))
-    level = from_rpy((0.0, 0.0, -np.arctan2(first[1, 0], first[0, 0]))) @ _level(course)
+def _levelled(log: Log) -> Log:
+    """Return a log whose truth is in axes with x along the first heading."""
+    first = matrix(log.orientation[0])
+    level = from_rpy((0.0, 0.0, -np.arctan2(first[1, 0], first[0, 0])))
     for name in ('position', 'velocity', 'feet'):
         setattr(log, name, getattr(log, name) @ level.T)
     log.slip = log.slip @ level[:2, :2].T
-    log.orientation = np.array(
-        [quaternion(level @ matrix((x, y, z, w))) for x, y, z, w in log.orientation]
-    )
+    log.orientation = np.array([quaternion(level @ matrix(turn)) for turn in log.orientation])
     return log
 
 
@@ -414,20 +394,9 @@ COURSES = {
     'patches': Course(floor='patches'),
     'ice': Course(floor='ice'),
     'hexapod': Course('ch3r', 'patches'),
-    'long pushes': Course(floor='patches', push=0.3),
     'long pushes, ice': Course(floor='ice', push=0.6),
-    'slope': Course(slope=0.1),
-    'turning': Course(floor='patches', turn=0.3),
     'crawl': Course(floor='patches', gait='crawl', period=2.0, duty=0.85, lean=0.2, pace=0.3),
-    'flight': Course(duty=0.45),
-    'fast, 500 Hz': Course(floor='patches', pace=2.0, rate=500.0),
-    '200 Hz': Course(floor='patches', rate=200.0),
-    'soft feet': Course(floor='patches', soft=0.03),
-    'hard feet': Course(floor='patches', soft=0.005),
     'cheap IMU': Course(floor='patches', noise=HEAVY),
     'hexapod, ripple': Course('ch3r', 'ice', push=0.3, gait='ripple', duty=0.7),
-    'hexapod, wave': Course(
-        'ch3r', 'patches', push=0.6, gait='wave', period=2.0, duty=0.85, pace=0.5
-    ),
 }
 """The walks of the study; constants of the estimator were chosen on seeds below 101."""

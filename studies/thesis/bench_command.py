@@ -9,19 +9,17 @@ from __future__ import annotations
 
 import json
 import pathlib
-import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
 
 import matplotlib
 
 from ros_pad.commands.folder import new_folder
-from ros_pad.commands.progress import bar
 from ros_pad.contact import Foot
 from ros_pad.reports.files import save
 from ros_pad.reports.style import PAPER_STYLE, rendered
 from studies import command
-from studies.thesis import bench, bench_figures, bench_page
+from studies.thesis import bench, bench_figures, page
 from studies.thesis.bench_scene import BenchScene
 from studies.thesis.explained import counted
 
@@ -47,62 +45,38 @@ def main(words: Sequence[str]) -> int:
     scene = BenchScene.load(options.scene, foot)
     trial = bench.run(scene)
     folder = new_folder(options.out, scene.name)
+    report, files = folder / 'report.html', []
     try:
-        page, files = _write(trial, folder)
+        with matplotlib.rc_context(PAPER_STYLE):
+            drawn = bench_figures.draw(trial)
+            for number, each in drawn.items():
+                for kind in ('png', 'pdf'):
+                    files.append(folder / f'figure_{number}.{kind}')
+                    save(files[-1], rendered(each.figure, kind, dpi=DPI))
+        page.write_bench(trial, drawn, report)
     finally:
         with suppress(OSError):  # remove an empty folder, so that the name can be used again
             folder.rmdir()
-    summary = trial.as_dict() | {'report': str(page), 'figures': [str(file) for file in files]}
+    summary = trial.as_dict() | {'report': str(report), 'figures': [str(file) for file in files]}
     text = json.dumps(summary, indent=1, allow_nan=False)
     save(folder / 'summary.json', (text + '\n').encode())
-    if options.json:
-        print(json.dumps(summary, allow_nan=False))
-    else:
-        _show(trial)
-        print(f'figures:  {folder}')
-        print(f'report:   {page}')
+    command.show(options, summary, _table(trial) + f'\nfigures:  {folder}\nreport:   {report}')
     return 0
 
 
-def _write(
-    trial: bench.BenchTrial, folder: pathlib.Path
-) -> tuple[pathlib.Path, list[pathlib.Path]]:
-    """Write figures and page; return the page and the figures."""
-    page = folder / 'report.html'
-    files = []
-    with bar('drawing', 100.0, '%') as reach, matplotlib.rc_context(PAPER_STYLE):
-        drawn = bench_figures.draw(trial)
-        for done, (name, each) in enumerate(drawn.items(), start=1):
-            for kind in ('png', 'pdf'):
-                file = folder / f'{name}.{kind}'
-                save(file, rendered(each.figure, kind, dpi=DPI))
-                files.append(file)
-            reach(80.0 * done / len(drawn))
-        bench_page.write(trial, drawn, page)
-    return page, files
-
-
-def _show(trial: bench.BenchTrial) -> None:
+def _table(trial: bench.BenchTrial) -> str:
     scene = trial.scene
-    print(f'\n{scene.name}, {bench.FIDELITY}: {scene.description}\n')
-    lines = [list(bench_page.HEAD), *(bench_page.cells(row) for row in trial.rows)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
+    lines = [list(page.HEAD), *(page.cells(row) for row in trial.rows)]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(page.HEAD))]
+    shown = [f'{scene.name}, {bench.FIDELITY}: {scene.description}', '']
     for line in lines:
-        print(
-            '  '.join(
-                text.rjust(width) if 5 <= column <= 7 else text.ljust(width)
-                for column, (text, width) in enumerate(zip(line, widths, strict=True))
-            ).rstrip()
-        )
-    print(f'\nStatements of the thesis: {counted(trial.claims)}.')
+        shown.append('  '.join(map(str.ljust, line, widths)).rstrip())
+    shown += ['', f'Statements of the thesis: {counted(trial.claims)}.']
     for claim in trial.claims:
-        print(f'\n{claim.where}: {claim.verdict}')
-        said = f'{claim.thesis} {claim.printed and f"({claim.printed})"}'
-        for who, text in (('thesis', said), ('here', claim.ours), ('rule', claim.reason())):
-            print(textwrap.fill(text, 99, initial_indent=f'  {who:8}', subsequent_indent=10 * ' '))
-    print()
-    for note in trial.notes:
-        print(textwrap.fill(note, 99, initial_indent='note:     ', subsequent_indent=10 * ' '))
+        shown += ['', f'{claim.where}: {claim.verdict}', f'  thesis  {claim.thesis}']
+        shown += [f'  here    {claim.ours}', f'  rule    {claim.reason()}']
+    shown += ['', *(f'note:     {note}' for note in trial.notes)]
     for omission in trial.omitted:
         bound = '' if omission.bound is None else f' (at most {100 * omission.bound:.2g} %)'
-        print(f'left out: {omission.term}{bound}: {omission.reason}')
+        shown.append(f'left out: {omission.term}{bound}: {omission.reason}')
+    return '\n'.join(shown)

@@ -7,6 +7,7 @@ import dataclasses
 import math
 import os
 import pathlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
@@ -19,8 +20,6 @@ from ros_pad.contact.pad import Pad, need_stiffness
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.simulation.scene import Scene, foot_of
-
-BENCHES = ('inflation', 'press', 'tangential', 'foot')
 
 
 @dataclass(frozen=True)
@@ -203,19 +202,14 @@ class BenchScene:
             raise ConfigError(
                 f'{table.origin}: is no bench, but a scene with a robot: Scene.load reads it'
             )
-        kind = table.choice('bench', BENCHES)
+        kind = table.choice('bench', tuple(_READERS))
         description = table.text('description', default='')
         own_foot = foot_of(table)
         foot = foot or own_foot
         measurements = _measurements(table)
-        setup: Setup
-        if kind in ('inflation', 'press', 'foot'):
+        if kind != 'tangential':
             need_stiffness(f'the bench {kind}', foot.pad)
-        if kind == 'inflation':
-            setup = _inflation(table, foot.pad)
-        elif kind == 'press':
-            setup = _press(table, foot.pad)
-        elif kind == 'foot':
+        if kind == 'foot':
             if foot.capillary_force:
                 raise ConfigError(
                     f'{table.origin}: foot {foot.source}: capillary_force = '
@@ -223,9 +217,8 @@ class BenchScene:
                     'bounds of its own on that force'
                 )
             foot = dataclasses.replace(foot, limit=table.choice('criterion', criteria(foot.pad)))
-            setup = _foot(table, foot)
-        else:
-            setup = _tangential(table)
+        setup = _READERS[kind](table, foot)
+        if kind == 'tangential':
             # The sole keeps its size: around the one dome, the other pads stay part of it.
             share = foot.shear_stiffness / foot.pads
             foot = dataclasses.replace(foot, pads=1, shear_stiffness=share)
@@ -263,49 +256,51 @@ def _measurements(table: Table) -> pathlib.Path:
     return path
 
 
-def _inflation(table: Table, pad: Pad) -> InflationBench:
-    burst = BURST * pad.stiffness / pad.radius
+def _numbers(table: Table, **wanted: tuple[str, float, float]) -> dict[str, float]:
+    """Return numbers by key, each with unit, lowest and highest value."""
+    return {name: table.number(name, *given) for name, given in wanted.items()}
+
+
+def _inflation(table: Table, foot: Foot) -> InflationBench:
+    burst = 0.99 * BURST * foot.pad.stiffness / foot.pad.radius
     return InflationBench(
-        highest_pressure=table.number('highest_pressure', 'Pa', 1e3, 0.99 * burst),
-        claimed_error=table.number('claimed_error', '(relative)', 0.0, 1.0),
+        **_numbers(
+            table, highest_pressure=('Pa', 1e3, burst), claimed_error=('(relative)', 0.0, 1.0)
+        )
     )
 
 
-def _press(table: Table, pad: Pad) -> PressBench:
+def _press(table: Table, foot: Foot) -> PressBench:
+    pad = foot.pad
     end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
     pressure = table.number('pressure', 'Pa', 1e3, end)
-    pressed_flat = pressure * math.pi * pad.radius**2
-    forces = []
+    force = ('N', 0.0, pressure * math.pi * pad.radius**2)  # pressed flat
+    text: dict[str, float] = {}
     if 'text_forces' in table:
         with table.table('text_forces') as part:
-            for place in ('first', 'second', 'third'):
-                forces.append(part.number(place, 'N', 0.0, pressed_flat))
-    return PressBench(
-        pressure=pressure,
-        highest_force=table.number('highest_force', 'N', 0.0, pressed_flat),
-        text_forces=tuple(forces),
-    )
+            text = _numbers(part, first=force, second=force, third=force)
+    return PressBench(pressure, table.number('highest_force', *force), tuple(text.values()))
 
 
-def _liquid(floor: Table) -> dict[str, float]:
-    """Return the numbers of the liquid on a floor, by the names that benches have for them."""
+def _dragged(table: Table, floor: Table) -> dict[str, float]:
+    """Return the numbers of :class:`DragBench`."""
     advancing = floor.number('advancing_angle', 'rad', 0.0, math.pi)
     return {
-        'film_thickness': floor.number('film_thickness', 'm', 1e-9, 0.01),
-        'viscosity': floor.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
         'advancing_angle': advancing,
-        'receding_angle': floor.number('receding_angle', 'rad', 0.0, advancing),
+        'viscosity': floor.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
+        **_numbers(
+            floor, film_thickness=('m', 1e-9, 0.01), receding_angle=('rad', 0.0, advancing)
+        ),
+        **_numbers(table, speed=('m/s', 1e-6, 1.0), dwell=('s', 0.0, 3600.0)),
     }
 
 
 def _foot(table: Table, foot: Foot) -> FootBench:
     with table.table('floor') as part:
-        liquid = _liquid(part)
-        roughness = part.number('roughness', 'm', 0.0, 1e-3)
+        numbers = _dragged(table, part) | _numbers(part, roughness=('m', 0.0, 1e-3))
     with table.table('doubt') as part:
         factor = part.number('factor', '(factor)', 1.0, 10.0)
-        samples = part.integer('samples', 20, 100000)
-        seed = part.integer('seed', 0, 2**32 - 1)
+        samples, seed = (part.integer('samples', 20, 100000), part.integer('seed', 0, 2**32 - 1))
     pressure = table.number('pressure', 'Pa', 1e3, foot.ceiling)
     carried = foot.pads * float(force_limit(foot.pad, pressure, foot.limit))
     if not carried:
@@ -315,38 +310,34 @@ def _foot(table: Table, foot: Foot) -> FootBench:
         )
     # With the fewest domes that are drawn, too, domes carry all of the load.
     highest = table.number('highest_load', 'N', 1e-3, carried / factor)
-    lowest_error = table.number('claimed_lowest', '(relative)', 0.0, 1.0)
+    least = table.number('claimed_lowest', '(relative)', 0.0, 1.0)
     return FootBench(
-        pressure=pressure,
-        lowest_load=table.number('lowest_load', 'N', 1e-4, 0.5 * highest),
-        highest_load=highest,
-        speed=table.number('speed', 'm/s', 1e-6, 1.0),
-        dwell=table.number('dwell', 's', 0.0, 3600.0),
-        **liquid,
-        roughness=roughness,
+        **numbers,
+        **_numbers(
+            table, lowest_load=('N', 1e-4, 0.5 * highest), claimed_highest=('(relative)', least, 1)
+        ),
+        **{'pressure': pressure, 'highest_load': highest, 'claimed_lowest': least},
         factor=factor,
         samples=samples,
         seed=seed,
-        claimed_lowest=lowest_error,
-        claimed_highest=table.number('claimed_highest', '(relative)', lowest_error, 1.0),
     )
 
 
-def _tangential(table: Table) -> TangentialBench:
+def _tangential(table: Table, foot: Foot) -> TangentialBench:
     with table.table('floor') as part:
-        liquid = _liquid(part)
+        numbers = _dragged(table, part)
     with table.table('design') as part:
-        smallest = part.number('smallest_radius', 'm', 1e-5, 1e-2)
-        largest = part.number('largest_radius', 'm', smallest, 1e-1)
-        claimed_smallest = part.number('claimed_smallest', 'm', smallest, largest)
-        claimed_largest = part.number('claimed_largest', 'm', claimed_smallest, largest)
-    return TangentialBench(
-        highest_load=table.number('highest_load', 'N', 1e-3, 100.0),
-        speed=table.number('speed', 'm/s', 1e-6, 1.0),
-        dwell=table.number('dwell', 's', 0.0, 3600.0),
-        **liquid,
-        smallest_radius=smallest,
-        largest_radius=largest,
-        claimed_smallest=claimed_smallest,
-        claimed_largest=claimed_largest,
-    )
+        numbers |= _numbers(part, smallest_radius=('m', 1e-5, 1e-2))
+        numbers |= _numbers(part, largest_radius=('m', numbers['smallest_radius'], 1e-1))
+        ends = numbers['smallest_radius'], numbers['largest_radius']
+        numbers |= _numbers(part, claimed_smallest=('m', *ends))
+        numbers |= _numbers(part, claimed_largest=('m', numbers['claimed_smallest'], ends[1]))
+    return TangentialBench(**numbers, **_numbers(table, highest_load=('N', 1e-3, 100.0)))
+
+
+_READERS: dict[str, Callable[[Table, Foot], Setup]] = {
+    'inflation': _inflation,
+    'press': _press,
+    'tangential': _tangential,
+    'foot': _foot,
+}

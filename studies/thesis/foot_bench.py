@@ -21,16 +21,15 @@ from ros_pad.contact.limits import force_limit
 from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid, hysteresis_force, meniscus
 from ros_pad.contact.pad import Array
 from ros_pad.contact.resistance import Foot
-from ros_pad.simulation.terms import Term as Omission
-from studies.thesis.bench import CAPILLARY, DRY, NOT_CODED, WET, BenchTrial, Curve, Row, slip_force
+from studies.thesis.bench import NOT_CODED, BenchTrial, Curve, Row
 from studies.thesis.bench_scene import BenchScene, FootBench
-from studies.thesis.explained import MINIMAL, Claim
+from studies.thesis.explained import MINIMAL, Claim, Omission, claim, left_out, notes
+from studies.thesis.tangential import CAPILLARY, DRY, WET, slip_force
 
 FLAT, DOME = 'flat', 'dome'
 SMOOTH, ROUGH = 'smooth', 'rough'
 CASES = tuple(itertools.product((FLAT, DOME), (SMOOTH, ROUGH)))
 NONE, LINES, SUCTION = 'no capillary force', 'pinned lines', 'pinned lines and suction'
-SECTION, FOOT_OF_43 = '4.3.1', 'model/foot.md#the-foot-of-chapter-43'
 PATTERN = '4.18, gaps full of water'
 STRAIGHT = 0.02  # deviation over the largest force up to which a line is straight; ours
 LOW, HIGH = 0.05, 0.95  # quantiles of an interval
@@ -292,16 +291,12 @@ def _claims(
     lines: Mapping[str, Line],
 ) -> tuple[Claim, ...]:
     return (
-        Claim(
-            33,
-            'Microscope pictures of a smooth and a rough plastic.',
+        claim(
+            'microscope pictures of a',
             f'The rough one is taken as {1e6 * setup.roughness:g} µm RMS, drawn up to twice and '
             'half.',
             (setup.roughness,),
             None,
-            SECTION,
-            missing='the scale of the pictures, the roughness',
-            see=FOOT_OF_43,
         ),
         *(_sign_claim(setup, rows, *case) for case in CASES),
         _linear_claim(setup, lines),
@@ -332,18 +327,12 @@ def _sign_claim(setup: FootBench, rows: Sequence[Row], shape: str, floor: str) -
             highs += high
     decided = True if min(lows) > 0.0 else False if max(highs) < 0.0 else None
     loads = f'At {setup.lowest_load:g} and {setup.highest_load:g} N: '
-    return Claim(
-        34,
-        f'F_cap = F_wet − F_dry is what the liquid adds ({shape}, {floor}).',
+    return claim(
+        'f cap f wet',
         loads + '; '.join(parts).replace('-', '−') + f'; {setup.samples} draws.',
         (*lows, *highs),
         decided,
-        SECTION,
-        printed='above 0, no number',
-        rule='Decided if 5 to 95 % of draws are on one side of 0 at both loads, with any bound on '
-        'capillary force.',
-        missing='number of domes, loads, depth of water, contact angles, roughness',
-        see=FOOT_OF_43,
+        thesis=f'F_cap = F_wet − F_dry is what the liquid adds ({shape}, {floor}).',
     )
 
 
@@ -355,39 +344,26 @@ def _few(value: float) -> str:
 def _linear_claim(setup: FootBench, lines: Mapping[str, Line]) -> Claim:
     worst = max(lines, key=lambda name: lines[name].deviation)
     good = sum(line.deviation <= STRAIGHT for line in lines.values())
-    return Claim(
-        34,
-        'Friction is linear in the contact force.',
+    return claim(
+        'friction is linear in',
         f'Up to {setup.highest_load:g} N {good} of {len(lines)} lines are straight; the worst is '
         f'off by {100 * lines[worst].deviation:.2g} % of its largest force ({worst}).',
         tuple(line.deviation for line in lines.values()),
         True if good == len(lines) else None,
-        SECTION,
-        rule=f'All within {100 * STRAIGHT:g} %. That dry lines are straight is assumed (area in '
-        'proportion to the load).',
-        tuned='contact areas in proportion to the load',
-        missing='points of Fig. 34a, depth of water and roughness, which bend the wet lines',
-        see=FOOT_OF_43,
     )
 
 
 def _small_claim(found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
     share = max(each.lines / each.wet for each in (*found[DOME, SMOOTH], *found[DOME, ROUGH]))
     first, last = found[DOME, SMOOTH][0], found[DOME, SMOOTH][-1]
-    return Claim(
-        34,
-        'The capillary force is far below the tangential force, and not in proportion to the '
-        'load.',
+    return claim(
+        'the capillary force is',
         f'Pinned lines hold at most {100 * share:.2g} % of the force of domes, and '
         f'{last.lines / first.lines:.2f} times as much at the highest as at the lowest load, '
         f'where dry friction is {last.dry / first.dry:.1f} times as much. Suction on moist ground '
         f'may be {100 * first.suction / first.dry:.0f} % of it at the lowest load.',
         (share,),
         share <= MINIMAL and last.lines / first.lines < last.dry / first.dry * (1.0 - MINIMAL),
-        SECTION,
-        rule=f'At most {100 * MINIMAL:g} %, and growing less than the load. On flooded ground, at '
-        'any contact angles (four times as much at most); on moist ground not at light loads.',
-        see=FOOT_OF_43,
     )
 
 
@@ -399,21 +375,16 @@ def _error_claim(
     last = found[DOME, SMOOTH][-1]
     middle = 0.5 * (setup.claimed_lowest + setup.claimed_highest)
     needed = [middle * force / math.sqrt(2.0) for force in (last.lines, last.suction)]
-    return Claim(
-        34,
-        'Measured and estimated capillary forces agree, errors included.',
+    return claim(
+        'measured and estimated capillary 2',
         f'By {len({row.model for row in mine})} readings and liquids, estimates for the foot are '
         f'{_few(min(estimates))} to {_few(max(estimates))} mN.',
         tuple(estimates),
         None,
-        SECTION,
         printed=f'{100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %',
         rule=f'To know F_cap to {100 * middle:.0f} %, each force at {setup.highest_load:g} N must '
         f'be known to {100 * needed[0] / last.dry:.2g} % (if it is that of pinned lines) or '
         f'{100 * needed[1] / last.dry:.2g} % (if that of suction).',
-        missing='F_wet and F_dry at each load with their scatter, number of domes, depth of '
-        'water, contact angles, roughness',
-        see=FOOT_OF_43,
     )
 
 
@@ -427,39 +398,30 @@ def _viscosity_claim(
 ) -> Claim:
     shear = _shear(foot, setup)
     share = shear / min(each.wet for pulled in found.values() for each in pulled)
-    return Claim(
-        34,
-        'The stage is slow enough to keep viscosity out.',
+    return claim(
+        'the stage is slow',
         f'Shear of the film is at most {1e3 * shear:.1g} mN, {100 * share:.1g} % of the smallest '
         'force. But films drain during so slow a pull, which moves F_wet more than any capillary '
         'force.',
         (share,),
         share <= STRAIGHT,
-        '3.2.2, 4.3.1',
         printed=f'{1e3 * setup.speed:g} mm/s',
-        rule=f'Shear at most {100 * STRAIGHT:g} % of the smallest force, with the thinnest film '
-        'that is assumed to lubricate.',
-        see=FOOT_OF_43,
     )
 
 
 def _pressure_claim(foot: Foot, setup: FootBench) -> Claim:
     each = {
         name: foot.pads * float(force_limit(foot.pad, setup.pressure, name))
-        for name in ('measured', 'thickness', 'max_depth', 'flattening')
+        for name in ('measured', 'thickness', 'flattening')
     }
-    return Claim(
-        34,
-        f'A foot stands on domes of {1e-3 * setup.pressure:g} kPa.',
+    return claim(
+        'a foot stands on',
         f'{foot.pads} such domes carry '
         + ', '.join(f'{value:.2f} N by `{name}`' for name, value in each.items())
         + '. The line through the limits of 3.2.2 is 0 below 52 kPa.',
         tuple(each.values()),
         None,
-        SECTION,
-        printed='no load, no number of domes',
-        missing='number of domes, loads, and a measured limit at 50 kPa',
-        see='model/force_limit.md#which-one-and-why',
+        thesis=f'A foot stands on domes of {1e-3 * setup.pressure:g} kPa.',
     )
 
 
@@ -469,21 +431,14 @@ def _title_claim(found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
         dome, flat = found[DOME, floor][place], found[FLAT, floor][place]
         gains.append(dome.wet / flat.wet)
         shares.append((dome.lines + dome.suction) / (dome.wet - flat.wet))
-    return Claim(
-        34,
-        'Title: shape enhances wet adhesion.',
+    return claim(
+        'title shape enhances wet',
         f'On flooded ground domes hold {min(gains):.1f} to {max(gains):.1f} times what the flat '
         'foot holds, for their pressure drains the film. Pinned lines and suction, upper bounds, '
         f'are {100 * min(shares):.2g} to {100 * max(shares):.2g} % of that gain: here shape '
         'enhances wet friction.',
         tuple(shares),
         None,
-        'title, 4.3.1',
-        printed='none',
-        rule='Friction and film are assumed, so these shares decide nothing; suction under a flat '
-        'sole on moist ground is not modelled.',
-        missing='F_wet and F_dry of Fig. 34, friction and film of its floors',
-        see=FOOT_OF_43,
     )
 
 
@@ -494,17 +449,16 @@ def _notes(scene: BenchScene, setup: FootBench) -> tuple[str, ...]:
     foot = scene.foot
     limit = foot.pads * float(force_limit(foot.pad, setup.pressure, foot.limit))
     full = foot.sole_area * foot.conforming_pressure
-    return (
-        'The thesis prints pressure, speed and errors of figure 34, and nothing else: loads, '
-        'domes, sole, friction, film, roughness and contact angles are assumed.',
-        f'At {1e-3 * setup.pressure:g} kPa {foot.pads} domes carry {limit:.2f} N by the criterion '
-        f'{foot.limit}; the flat sole touches all over at {full:.2f} N. Past these loads lines '
-        'bend.',
-        f'Draws: {setup.samples}, each assumed number with a factor of its own, up to '
-        f'{setup.factor:g} up and down, seed {setup.seed}; intervals from 5 to 95 %.',
-        'Wet less dry is no capillary force alone: it holds the dry friction that the film takes '
-        'away, too. Without capillary force it has the sign of boundary friction less dry '
-        'friction, and a film only loses.',
+    return notes(
+        'foot',
+        pressure=1e-3 * setup.pressure,
+        pads=foot.pads,
+        limit=limit,
+        criterion=foot.limit,
+        full=full,
+        samples=setup.samples,
+        factor=setup.factor,
+        seed=setup.seed,
     )
 
 
@@ -514,25 +468,8 @@ def _omitted(
     shear = _shear(foot, setup)
     gap = press(foot.pad, setup.pressure, setup.lowest_load / foot.pads).gap
     weight = WATER.density * GRAVITY * foot.sole_area * float(gap)
-    return (
-        Omission(
-            'viscous shear of the film',
-            shear / min(each.wet for pulled in found.values() for each in pulled),
-            f'relative, of the smallest wet force: η v S/h_c = {1e3 * shear:.2g} mN',
-        ),
-        Omission(
-            'weight of the liquid that menisci lift',
-            weight / setup.lowest_load,
-            f'relative, of the lowest load: gaps full of water, {1e3 * weight:.2g} mN',
-        ),
-        Omission(
-            'suction under a flat sole on a moist floor',
-            None,
-            'a film that ends at the edge of the sole pulls with 2γ/h; on a flooded floor it does '
-            'not, and the thesis does not give the depth of its water',
-        ),
-        Omission('liquid dragged under the pads', None, 'film taken to travel with the foot'),
-        Omission(
-            'domes leaning over as they are dragged', None, 'shape taken from pressing alone'
-        ),
+    return left_out(
+        'foot',
+        shear=shear / min(each.wet for pulled in found.values() for each in pulled),
+        weight=weight / setup.lowest_load,
     )

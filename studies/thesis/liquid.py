@@ -40,11 +40,10 @@ from ros_pad.reports.style import (
     VERMILION,
     WET,
     WIDE,
-    Drawn,
     legend,
 )
 from ros_pad.reports.wetted import DRY, WETTED, picture, shaded
-from studies.thesis.explained import Claim, Explained
+from studies.thesis.explained import Claim, Explained, claim, explained
 
 NUMBERS = (26, 27, 28, 29, 30, 31)
 TENSIONS = (0.0016, 0.002, 0.004)  # N/m of the liquid, thesis
@@ -56,8 +55,6 @@ _CURVE = tuple(np.linspace(90.0, 0.0, 31))
 _HALF = Liquid(0.004, 0.002)
 _BALANCES = {'energy': '-', 'thesis': (0, (4, 2))}
 _LEVEL = {'energy': (GREEN, '-'), 'force': (BLUE, (0, (1, 1))), 'thesis': (VERMILION, (0, (4, 2)))}
-SECTION, CAPILLARY = '4.2.1', 'capillary.md#what-the-thesis-prints-otherwise'
-ON_DOME = 'On one of its pressed domes; the size of its mesh is not printed.'
 _ALIGNED = 0.15  # relative error up to which heights count as well aligned
 _CONE = (1.6e-3, 1.6e-3 - 2e-3 * math.tan(math.radians(10.0)), 2e-3)
 
@@ -209,19 +206,6 @@ def _one_of_many() -> Mesh:
 
 # --- what is drawn -------------------------------------------------------------------------------
 
-_MEASURED = 'Nothing: the thesis computes it and measures none of it.'
-_MODELLED = (
-    'Layers on a mesh (chapter 4): in each slice round the axis the surface is an arc of a '
-    'circle, and its height is in balance. The balance of energy is ours; the balance of the '
-    'thesis is 4.11, summed up from the floor. Both are compared with the exact meniscus of a '
-    'wide bath.'
-)
-_ASSUMED = (
-    'The dome: 75 kPa under 0.19 N, radius 1.5 mm, one of the pressed domes that the thesis '
-    'measured; the thesis shows the size of its mesh only in a picture. The contact angle follows '
-    'from the tensions (3.81). The floor is wet, so the surface meets it at an angle of 0.'
-)
-
 
 def _figure_26() -> Explained:
     figure = Figure(figsize=(WIDE, 2.15))
@@ -241,21 +225,7 @@ def _figure_26() -> Explained:
         )
         figure.text(k / 3.0 + 0.015, 0.93, f'({"abc"[k]}) {name}')
         figure.text(k / 3.0 + 0.015, 0.04, f'{heights} mm', fontsize=7.0)
-    return Explained(
-        26,
-        Drawn(
-            figure,
-            'Figure 26: liquid round a dome, a truncated cone and a general shape',
-            'Three pads in shades of grey, wet up to a line on their walls, with a collar of '
-            'liquid round each; the line is level on dome and cone, and wavy on the third',
-            'Liquid of 4 mN/m on a solid of 2 mN/m. Dark blue: what is wet. Pale blue: the '
-            'surface of the liquid, from the balance of energy. Numbers: mean heights.',
-        ),
-        _MEASURED,
-        _MODELLED + ' Round the general shape the exact surface is that of least energy in 3-D.',
-        _ASSUMED + ' Cone and general shape: the thesis gives no size of either.',
-        _claims_26(),
-    )
+    return explained(26, figure, _claims_26())
 
 
 def _claims_26() -> tuple[Claim, ...]:
@@ -267,28 +237,19 @@ def _claims_26() -> tuple[Claim, ...]:
     general = found['general shape']
     spreads = [1e6 * general.layers['energy'].height_spread, 1e6 * general.spread]
     return (
-        Claim(
-            26,
-            'Simulated liquid agrees with what is observed.',
+        claim(
+            'simulated liquid agrees with',
             f'Heights of its balance are off by {_percents(off["thesis"])} on dome, cone and '
             f'general shape; those of the balance of energy by {_percents(off["energy"])}.',
             (*off['thesis'], *off['energy']),
             all(abs(each) <= _ALIGNED for each in off['thesis']),
-            SECTION,
-            rule=f'Within {100 * _ALIGNED:g} % of exact heights, on all three shapes.',
-            see=CAPILLARY,
         ),
-        Claim(
-            26,
-            'Round a general shape the wetted height differs from place to place.',
+        claim(
+            'round a general shape',
             f'From slice to slice by {spreads[0]:.0f} µm; that of the exact surface by '
             f'{spreads[1]:.0f} µm.',
             tuple(spreads),
             spreads[1] > 0.02e6 * general.height,
-            SECTION,
-            rule='More than 2 % of the height, on the exact surface. Slices, which do not affect '
-            'each other, exaggerate it.',
-            see=CAPILLARY,
         ),
     )
 
@@ -301,10 +262,7 @@ def _figure_27() -> Explained:
     left.plot(np.degrees(turns), [1e6 * found.section(a) for a in turns], color=BLUE)
     twin = left.twinx()
     twin.plot(
-        np.degrees(turns),
-        [1e6 * found.force(a) for a in turns],
-        color=VERMILION,
-        ls=(0, (4, 2)),
+        np.degrees(turns), [1e6 * found.force(a) for a in turns], color=VERMILION, ls=(0, (4, 2))
     )
     twin.spines['right'].set_visible(True)
     twin.set_ylim(None, 0.0)
@@ -324,22 +282,7 @@ def _figure_27() -> Explained:
     right.axvline(0.0, color=BLACK, lw=0.7)
     right.set_xlabel('force along the motion / µN')
     right.set_title('(b) dome')
-    return Explained(
-        27,
-        Drawn(
-            figure,
-            'Figure 27: tangential capillary force along a direction of motion',
-            'Left: projected section and force of the general shape over the direction, with '
-            'waves. Right: four values of the force on a dome; that of the whole dome is 0',
-            '(a) Section and force by 4.18 with its sign mended. (b) Forces by 4.18 on a dome, '
-            'and exact ones. A force below 0 is a pull of the liquid.',
-        ),
-        _MEASURED,
-        _MODELLED + ' The exact force on one half is the pull along the contact line and the '
-        'suction below this line.',
-        _ASSUMED,
-        _claims_27(readings),
-    )
+    return explained(27, figure, _claims_27(readings))
 
 
 class _Readings(NamedTuple):
@@ -372,30 +315,22 @@ def _claims_27(readings: _Readings) -> tuple[Claim, ...]:
     net = 1e6 * float(np.hypot(*surface.force[:2]))
     general = 1e6 * abs(bodies()['general shape'].layers['energy'].force(0.0))
     return (
-        Claim(
-            27,
-            'The capillary force along the motion is pressure times projected section (4.18).',
+        claim(
+            'the capillary force along',
             f'Round the general shape it is {general:.2f} µN, of the surface of least energy '
             f'{net:.4f}: opposite sides cancel. For one half of the dome 4.18 gives '
             f'{forces[0]:+.1f} µN, {forces[1]:+.2f} with the sign of 4.17 mended; exact is '
             f'{forces[2]:+.1f}, mostly the pull of the contact line, which 4.18 leaves out.',
             (general, net, *forces),
             net >= 0.5 * general,
-            SECTION,
-            rule='At least half of it on the exact surface.',
-            see=CAPILLARY,
         ),
-        Claim(
-            27,
-            'The pressure is γ(1/R + 1/r) (4.17).',
+        claim(
+            'the pressure is 1',
             f'On the dome this gives {readings.printed:+.1f} Pa, but the pressure in raised '
             f'liquid is below that of the air: {readings.exact:+.1f} Pa at the line. Ring and arc '
             f'curve in opposite senses: γ(1/r - 1/R) is {readings.mended:+.1f} Pa.',
             (readings.printed, readings.exact, readings.mended),
             readings.printed < 0.0,
-            SECTION,
-            rule='Below the air, as in all raised liquid.',
-            see=CAPILLARY,
         ),
     )
 
@@ -433,28 +368,13 @@ def _figure_28() -> Explained:
     ]
     legend(figure, handles)
     curve = climbed(tension, 'energy')[1]
-    return Explained(
-        28,
-        Drawn(
-            figure,
-            'Figure 28: liquid of 4 mN/m on a dome, for rising tension of the solid',
-            'Four sections of a dome and the liquid beside it, which climbs from panel to panel; '
-            'the exact surface lies a little lower on the wall and reaches farther out',
-            'Contact angles of 90, 60, 30 and 0°.',
-        ),
-        _MEASURED,
-        _MODELLED,
-        _ASSUMED,
-        _claims_28(layers, truths, curve),
-    )
+    return explained(28, figure, _claims_28(layers, truths, curve))
 
 
 def _claims_28(layers: list[float], truths: list[float], curve: Array) -> tuple[Claim, ...]:
     return (
-        Claim(
-            28,
-            'The level rises as the tension of the solid grows from a quarter of that of the '
-            'liquid to all of it.',
+        claim(
+            'the level rises as',
             'From panel to panel layers have '
             + ', '.join(f'{each:.2f}' for each in layers)
             + ' mm, the exact meniscus '
@@ -462,20 +382,13 @@ def _claims_28(layers: list[float], truths: list[float], curve: Array) -> tuple[
             + ' mm.',
             (*layers, *truths),
             bool(np.all(np.diff(curve) > 0.0)) and _rising(truths),
-            SECTION,
-            rule=f'Rises by layers and exactly. {ON_DOME}',
         ),
-        Claim(
-            28,
-            'Only these tensions wet (contact angles of 90 to 0° by 3.81).',
+        claim(
+            'only these tensions wet',
             f'Under a dome liquid rises already at 90°, by {truths[0]:.2f} mm: it climbs where '
             'contact angle and inclination of the wall add up to less than 180°.',
             (truths[0],),
             truths[0] <= 0.0,
-            SECTION,
-            printed='γl/4 to γl',
-            rule='No rise at 90°.',
-            see=CAPILLARY,
         ),
     )
 
@@ -496,21 +409,7 @@ def _figure_29() -> Explained:
     ax.set_xlabel('tension of the solid / (mN/m)')
     ax.set_ylabel('wetted height / mm')
     legend(figure, _handles(), 3)
-    return Explained(
-        29,
-        Drawn(
-            figure,
-            'Figure 29: wetted height over the tension of the solid',
-            'Height of the liquid over the tension of the solid for three liquids: every curve '
-            'rises to its end, and steepest there',
-            'From a quarter of the tension of the liquid (contact angle 90°) to all of it (0°). '
-            'Discs: exact, at 90, 60, 30 and 0°.',
-        ),
-        _MEASURED,
-        _MODELLED,
-        _ASSUMED,
-        _claims_29(),
-    )
+    return explained(29, figure, _claims_29())
 
 
 def _claims_29() -> tuple[Claim, ...]:
@@ -519,40 +418,30 @@ def _claims_29() -> tuple[Claim, ...]:
     middle = [1e3 * row[1] for row in truths]
     last = [_slope_at_end(tension) for tension in TENSIONS]
     return (
-        Claim(
-            29,
-            'The height rises with the tension of the solid over the whole range.',
+        claim(
+            'the height rises with',
             'Also with the balance of energy and on the exact meniscus, from '
             f'{1e3 * truths[-1][0]:.2f} to {1e3 * truths[-1][-1]:.2f} mm for 4 mN/m.',
             (truths[-1][0], truths[-1][-1]),
             all(bool(np.all(np.diff(each) > 0.0)) for each in energy)
             and all(_rising(each) for each in truths),
-            SECTION,
-            rule=f'Three liquids. {ON_DOME}',
         ),
-        Claim(
-            29,
-            'At the same contact angle, a liquid of higher tension climbs higher.',
+        claim(
+            'at the same contact',
             'At a contact angle of 60° the exact heights are '
             + ', '.join(f'{each:.2f}' for each in middle)
             + ' mm.',
             tuple(middle),
             _rising(middle),
-            SECTION,
-            rule=f'Exact heights rise. {ON_DOME}',
         ),
-        Claim(
-            29,
-            'The height converges to a maximum, faster for a higher tension.',
+        claim(
+            'the height converges to',
             'The highest point is the end of the range, a contact angle of 0°; over its last '
             'twentieth the curves rise '
             + ', '.join(f'{each:.1f}' for each in last)
             + ' times as steeply as over the whole.',
             tuple(last),
             all(each < 0.1 for each in last),
-            SECTION,
-            rule='Less than a tenth of the mean slope at the end.',
-            see=CAPILLARY,
         ),
     )
 
@@ -581,21 +470,7 @@ def _figure_30() -> Explained:
     ax.set_xlabel('wetted height / mm')
     ax.set_ylabel('radius of curvature / mm')
     legend(figure, _handles(), 3)
-    return Explained(
-        30,
-        Drawn(
-            figure,
-            'Figure 30: radius of curvature over the wetted height',
-            'Radius of curvature over height for three liquids: no straight line through the '
-            'origin; the exact radius at the contact line lies elsewhere altogether',
-            'Each curve runs from a contact angle of 90° (left) to 0°. Discs: exact, at the '
-            'contact line, at 90, 60, 30 and 0°.',
-        ),
-        _MEASURED,
-        _MODELLED + ' The radius of its surface varies: the one at the contact line is drawn.',
-        _ASSUMED,
-        _claims_30(),
-    )
+    return explained(30, figure, _claims_30())
 
 
 def _claims_30() -> tuple[Claim, ...]:
@@ -607,9 +482,8 @@ def _claims_30() -> tuple[Claim, ...]:
     on_cone = [wet(cone, liquid_at(tension, 45.0), slices=3) for tension in TENSIONS]
     same = [float(each.curvature_radius[0]) / each.mean_height for each in on_cone]
     return (
-        Claim(
-            30,
-            'The radius of the surface is in proportion to the height of the liquid.',
+        claim(
+            'the radius of the',
             f'On the dome it goes from {shares[0]:.2f} to {shares[-1]:.2f} times the height, with '
             f'the balance of the thesis from {printed[0]:.2f} to {printed[-1]:.2f}; on a cone, at '
             'one contact angle, it is '
@@ -617,9 +491,6 @@ def _claims_30() -> tuple[Claim, ...]:
             + ' times the height for the three liquids.',
             (float(shares[0]), float(shares[-1]), *same),
             bool(np.ptp(shares) <= 0.1 * np.mean(shares)),
-            SECTION,
-            rule='The ratio within 10 %. True where contact angle and inclination stay the same.',
-            see=CAPILLARY,
         ),
     )
 
@@ -653,23 +524,7 @@ def _figure_31() -> Explained:
         )
     ax.set(xlabel='distance of neighbours / mm', ylabel='height / mm', ylim=(0.0, 2.2))
     ax.legend(loc='upper right', ncols=2, fontsize=7.0)
-    return Explained(
-        31,
-        Drawn(
-            figure,
-            'Figure 31: liquid between the pads of a foot',
-            'Nineteen domes standing in water; its height over the distance of the domes, which '
-            'rises towards a limit as they close in',
-            '(b) Level: one height between all domes. Discs: the surface of least energy between '
-            'domes of an endless pattern, joined to a wide bath at floor level.',
-        ),
-        _MEASURED,
-        'A level surface between equal domes (4.19 to 4.23) and its balances, and in 3-D the '
-        'surface of least energy round one dome of a hexagonal pattern.',
-        _ASSUMED + ' The liquid is water on silicone. The thesis shows the number of pads and '
-        'their distance only in a picture.',
-        _claims_31(true, limit),
-    )
+    return explained(31, figure, _claims_31(true, limit))
 
 
 def _claims_31(true: list[float], limit: float) -> tuple[Claim, ...]:
@@ -683,41 +538,31 @@ def _claims_31(true: list[float], limit: float) -> tuple[Claim, ...]:
     )
     off = [each for each in thesis if math.isfinite(each)]
     return (
-        Claim(
-            31,
-            'The narrower the space between the pads, the higher the liquid is drawn.',
+        claim(
+            'the narrower the space',
             'From 9 to 3.2 mm the surface of least energy rises from '
             f'{1e3 * true[-1]:.2f} to {1e3 * true[0]:.2f} mm. The rise has a limit, unlike in a '
             f'tube: where the slope of the wall is the contact angle, {1e3 * limit:.2f} mm.',
             (true[-1], true[0], limit),
             _rising(true[::-1]) and true[0] < limit,
-            '4.2.2',
             rule=f'Rises at each of {len(true)} distances. Size and distance of the domes are '
             'assumed; the liquid is water.',
         ),
-        Claim(
-            31,
-            'The balance of all pads (4.23) determines the height of the liquid.',
+        claim(
+            'the balance of all',
             f"The thesis' balance is off by {_percents(off)} at {len(off)} of {len(PITCHES)} "
             'distances, else over the top of the domes; the balance of energy by '
             f'{_percents(ours)}. A level surface leaves out the meniscus at each dome.',
             (*off, *ours),
             len(off) == len(PITCHES) and all(abs(each) <= _ALIGNED for each in off),
-            '4.2.2',
-            rule=f'Within {100 * _ALIGNED:g} % of least energy at all distances.',
-            see=CAPILLARY,
         ),
-        Claim(
-            31,
-            'A layer of liquid has the volume dz S - n S_sph (4.20).',
+        claim(
+            'a layer of liquid',
             'As printed an area is taken from a volume. With dz in both terms, '
             f'{1e9 * closest.volume:.2f} mm³ of water surround each dome 3.2 mm from its '
             'neighbours.',
             (closest.volume,),
             False,
-            '4.2.2',
-            rule='By units.',
-            see=CAPILLARY,
         ),
     )
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the thesis' figures on one page, with their measured, modelled and assumed parts."""
+"""Write pages: the thesis' figures with their statements, and one bench point by point."""
 
 from __future__ import annotations
 
 import html
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import matplotlib
 
@@ -15,11 +15,10 @@ from ros_pad.errors import InvalidInput
 from ros_pad.pace import Progress
 from ros_pad.reports.files import save
 from ros_pad.reports.page import embedded, page, table
-from ros_pad.reports.style import PAPER_STYLE
-from studies.thesis import bench, liquid, walks
-from studies.thesis import bench_figures as thesis
-from studies.thesis.bench_page import statements
-from studies.thesis.explained import Claim, Explained, counted
+from ros_pad.reports.style import PAPER_STYLE, Drawn
+from studies.thesis import bench, bench_figures, liquid, walks
+from studies.thesis.bench import FIDELITY, BenchTrial, Row
+from studies.thesis.explained import Claim, Explained, counted, explained
 
 _BENCHES = {
     'bench_inflation': (14, 15),
@@ -28,73 +27,12 @@ _BENCHES = {
     'bench_foot': (34,),
 }
 _DRAWN_WITH = {33: 34}  # pictures of the floors of figure 34
-NUMBERS = tuple(
-    sorted(
-        [n for numbers in _BENCHES.values() for n in numbers] + [*liquid.NUMBERS, *walks.NUMBERS]
-    )
-)
+NUMBERS = tuple(sorted([*sum(_BENCHES.values(), ()), *liquid.NUMBERS, *walks.NUMBERS]))
 
-_COMMON_DOME = (
-    'Nothing: radius 1.5 mm, stiffness 40 N/m and adhesion 0.006 J/m² are from the thesis.'
+HEAD = (
+    *('figure', 'quantity', 'model', 'condition', 'at', 'modelled', 'measured', 'error'),
+    'statement of the thesis',
 )
-# Texts about what is measured, modelled and assumed, for each figure of a bench.
-_WORDS = {
-    10: (
-        'Nothing: the thesis computes it.',
-        'Rise of water between the domes of a sole by three readings of 3.101.',
-        'Nothing: water at 60° is from the thesis.',
-    ),
-    14: (
-        'Heights of four free domes, 55 to 85 kPa, from the program of the thesis. Dashed '
-        'profiles are spheres through the rim with these heights: the program has no outlines.',
-        'A spherical cap whose stretched skin balances the pressure (3.34 to 3.41).',
-        _COMMON_DOME,
-    ),
-    15: (
-        'Heights and sphere radii of the same four domes.',
-        'The same cap over all pressures; the stiffness in (d) is the one with which the cap has '
-        'the measured height.',
-        _COMMON_DOME,
-    ),
-    16: (
-        'Height, contact radius and gap of one dome at 75 kPa under three forces.',
-        'A sphere cut off flat by the floor (3.44 to 3.61), and the exact membrane of the same '
-        'energy.',
-        'Which forces belong to the three domes: those of the program and those of the text '
-        'differ, so both are drawn.',
-    ),
-    17: (
-        'Height and sphere radius of the same dome under the three forces.',
-        'As for figure 16, over all forces.',
-        'As for figure 16.',
-    ),
-    18: (
-        'Contact radius, depth and gap of the same dome under the three forces.',
-        'As for figure 16, over all forces.',
-        'As for figure 16.',
-    ),
-    20: (
-        'The force limits of the domes, 0.15, 0.30 and 0.40 N: where their curves end. The '
-        'thesis gives no numbers of the curves.',
-        'A foot with one pad: friction in proportion to the load and to the area of contact (3.65 '
-        'to 3.67), and a film of liquid that drains from under it.',
-        'Friction, shear strength, sole and film: the thesis gives only orderings.',
-    ),
-    21: (
-        'Nothing: the thesis compares with measurements, but does not give their numbers.',
-        'The capillary force of a ring of liquid by three versions of 3.82, and a bound on it.',
-        'Tensions of water and silicone, or those of the thesis, which are ten times smaller; '
-        'advancing and receding angles of 120° and 90° for the bound.',
-    ),
-    34: (
-        'Nothing: the thesis prints no number of the figure.',
-        'A whole foot at 50 kPa and flat, as in figure 20; roughness of the floor raises the film '
-        'that keeps contact apart and the pressure at which a sole conforms. Bounds on the force '
-        'of pinned lines, and on suction.',
-        'Number of domes, loads, friction, film, roughness and contact angles; intervals draw '
-        'each of them up to twice and half.',
-    ),
-}
 
 
 def draw(numbers: Collection[int] = NUMBERS, progress: Progress | None = None) -> list[Explained]:
@@ -122,37 +60,23 @@ def draw(numbers: Collection[int] = NUMBERS, progress: Progress | None = None) -
         )
     done: list[Explained] = []
     for name, own in _BENCHES.items():
-        if set(own) & set(numbers):
-            done += _of_bench(name, set(own) & set(numbers))
+        if wanted := set(own) & set(numbers):
+            trial = bench.run(name)
+            done += [
+                explained(number, figure, _claims_of(trial, number))
+                for number, figure in bench_figures.draw(trial).items()
+                if number in wanted
+            ]
     done += liquid.draw(numbers)
-    first = 0.1 if done else 0.0
-    if progress:
-        progress(first)
-    walked = walks.walk(
-        numbers, progress and (lambda share: progress(first + (0.95 - first) * share))
-    )
+    walked = walks.walk(numbers, progress and (lambda share: progress(0.1 + 0.85 * share)))
     done += walks.draw(walked, numbers)
     if progress:
         progress(1.0)
     return sorted(done, key=lambda each: each.number)
 
 
-def _of_bench(name: str, numbers: Collection[int]) -> list[Explained]:
-    trial = bench.run(name)
-    drawn = thesis.draw(trial)
-    return [
-        Explained(
-            number,
-            drawn[f'figure_{number}'],
-            *_WORDS[number],
-            claims=tuple(
-                claim
-                for claim in trial.claims
-                if _DRAWN_WITH.get(claim.figure, claim.figure) == number
-            ),
-        )
-        for number in sorted(numbers)
-    ]
+def _claims_of(trial: BenchTrial, number: int) -> list[Claim]:
+    return [c for c in trial.claims if _DRAWN_WITH.get(c.figure, c.figure) == number]
 
 
 def write(
@@ -181,40 +105,113 @@ def write(
     """
     refuse(path, force)
     claims = [*text, *(claim for each in figures for claim in each.claims)]
+    subjects = [
+        [
+            f'<a href="#figure-{each.number}">{each.number}</a>',
+            html.escape(each.drawn.title.partition(': ')[2]),
+            counted(each.claims) or 'none of its own',
+        ]
+        for each in figures
+    ]
     parts = [
         "<h1>The thesis' figures, drawn again</h1>",
         f'<p class="facts">{len(figures)} figures · ros_pad {ros_pad.__version__}</p>',
         f'<p class="result">Of {len(claims)} statements of the thesis: {counted(claims)}.</p>',
         "<p>Each figure has the thesis' number. Where the thesis gives no number for a word, the "
         'number assumed here is in the rule.</p>',
-        table(
-            ['figure', 'subject', 'statements'],
-            [
-                [
-                    f'<a href="#figure-{each.number}">{each.number}</a>',
-                    html.escape(each.drawn.title.partition(': ')[2]),
-                    counted(each.claims) or 'none of its own',
-                ]
-                for each in figures
-            ],
-            range(0),
-        ),
+        table(['figure', 'subject', 'statements'], subjects, range(0)),
     ]
-    with matplotlib.rc_context(PAPER_STYLE):
-        for each in figures:
-            parts.append(f'<h2 id="figure-{each.number}">{html.escape(each.drawn.title)}</h2>')
-            parts.append(
-                embedded(each.drawn.figure, each.drawn.alt, html.escape(each.drawn.caption))
-            )
-            words = {
-                'measured': each.measured,
-                'modelled': each.modelled,
-                'assumed': each.assumed,
-            }
-            rows = [[f'<b>{name}</b>', html.escape(text)] for name, text in words.items()]
-            parts.append(table(['', ''], rows, range(0)))
-            if each.claims:
-                parts.append(statements(each.claims))
+    for each in figures:
+        parts += _figure(each.drawn, f'figure-{each.number}')
+        rows = [[f'<b>{name}</b>', html.escape(words)] for name, words in each.parts.items()]
+        parts.append(table(['', ''], rows, range(0)))
+        if each.claims:
+            parts.append(_statements(each.claims))
     if text:
-        parts += ['<h2>Statements without a figure</h2>', statements(text)]
+        parts += ['<h2>Statements without a figure</h2>', _statements(text)]
     save(path, page("The thesis' figures: ros_pad", parts).encode())
+
+
+def write_bench(
+    trial: BenchTrial, drawn: Mapping[int, Drawn], path: str | os.PathLike[str]
+) -> None:
+    """Write the page of a bench: one HTML file that needs no other file, and no script.
+
+    Parameters
+    ----------
+    trial : BenchTrial
+        Result of the bench scene.
+    drawn : mapping of int to Drawn
+        Figures of :func:`studies.thesis.bench_figures.draw` for the trial.
+    path : path
+        HTML file; an existing one is replaced.
+
+    Raises
+    ------
+    PadError
+        When the file cannot be written.
+    """
+    scene = trial.scene
+    facts = f'bench · {FIDELITY} · foot {scene.foot.source} · ros_pad {ros_pad.__version__}'
+    bounds = [
+        [
+            html.escape(each.term),
+            'unknown' if each.bound is None else f'≤ {100.0 * each.bound:.2g} %',
+            html.escape(each.reason),
+        ]
+        for each in trial.omitted
+    ]
+    points = [[html.escape(text) for text in cells(row)] for row in trial.rows]
+    parts = [
+        f'<h1>{html.escape(scene.name)}</h1><p class="facts">{html.escape(facts)}</p>',
+        f'<p>{html.escape(scene.description)}</p>',
+        f'<p class="result">Statements of the thesis: {counted(trial.claims)}.</p>',
+        '<h2>What the thesis states</h2>',
+        _statements(trial.claims),
+        *(part for number, each in drawn.items() for part in _figure(each, f'figure-{number}')),
+        '<h2>Point by point</h2>',
+        table(HEAD, points, range(5, 8)),
+        '<p class="note">Error: modelled over measured value, minus 1.</p>',
+        '<h2>Notes</h2>',
+        *(f'<p>{html.escape(note)}</p>' for note in trial.notes),
+        '<h2>What the model leaves out</h2>',
+        table(['left out', 'bound', 'of what, and where it comes from'], bounds, range(1, 2)),
+    ]
+    save(path, page(f'{scene.name}: ros_pad', parts).encode())
+
+
+def _figure(drawn: Drawn, anchor: str) -> list[str]:
+    with matplotlib.rc_context(PAPER_STYLE):
+        return [
+            f'<h2 id="{anchor}">{html.escape(drawn.title)}</h2>',
+            embedded(drawn.figure, drawn.alt, html.escape(drawn.caption)),
+        ]
+
+
+def _statements(claims: Sequence[Claim]) -> str:
+    """Return the table of statements with their verdicts, as HTML."""
+    rows = [
+        [
+            html.escape(claim.where),
+            f'<b>{claim.verdict}</b>',
+            *map(html.escape, (claim.thesis, claim.printed, claim.ours, claim.reason())),
+        ]
+        for claim in claims
+    ]
+    return table(['', '', 'the thesis states', 'its number', 'here', 'rule'], rows, range(0))
+
+
+def cells(row: Row) -> list[str]:
+    """Return a row as text in the columns of :data:`HEAD`; lengths in mm, small forces in mN."""
+    unit, factor = {'m': ('mm', 1e3)}.get(row.unit, (row.unit, 1.0))
+    if row.unit == 'N' and abs(row.modelled) < 5e-3:
+        unit, factor = 'mN', 1e3
+    at = [] if row.pressure is None else [f'{1e-3 * row.pressure:g} kPa']
+    at += [] if row.force is None else [f'{row.force:g} N']
+    return [
+        *(str(row.figure), row.quantity, row.model, row.condition, ', '.join(at)),
+        f'{factor * row.modelled:.4g} {unit}'.rstrip().replace('-', '−'),
+        '' if row.measured is None else f'{factor * row.measured:.4g} {unit}',
+        '' if row.error is None else f'{100.0 * row.error:+z.1f} %'.replace('-', '−'),
+        row.claimed,
+    ]

@@ -10,8 +10,8 @@ from typing import Any
 from ros_pad.reports.files import save
 from studies import command
 from studies.thesis import walks
-from studies.thesis.bench import DRAWS
 from studies.thesis.explained import Claim, Explained, counted
+from studies.thesis.tangential import DRAWS
 
 PAGE = command.ROOT / 'docs' / 'thesis.md'
 MARK = '<!-- below: python -m studies thesis --table -->\n'

@@ -24,13 +24,12 @@ from ros_pad.reports.style import (
     VERMILION,
     WET,
     WIDE,
-    Drawn,
     legend,
 )
 from ros_pad.reports.view import view_of
 from ros_pad.trials import loop
 from ros_pad.trials.trial import Trial
-from studies.thesis.explained import MINIMAL, Claim, Explained
+from studies.thesis.explained import MINIMAL, Claim, Explained, claim, explained
 
 # Scene, text, colour and line style of each case, in the thesis' order.
 RAIL: dict[str, tuple[str, str, Any]] = {
@@ -53,13 +52,6 @@ NUMBERS = (38, 39, *FLOOR_OF)
 ABOUT = 0.2  # relative error up to which a ratio is "approximately five times"
 STRAIGHT = 0.02  # "straight": m aside for each metre of distance; "firmly": slip over stroke
 
-_RAIL_SECTION, _RAIL_NUMBERS = '5.2', 'assumptions.md#the-leg-on-its-rail-thesis-52'
-_RAIL_TUNED = 'mass, rolling drag and load of the leg, friction and film of its foot'
-_DEMAND = 'Dry friction is assumed above the demand of the gait.'
-_HEXAPOD_SECTION, _HEXAPOD_NUMBERS = '5.3', 'model/thesis_walks.md'
-_HEXAPOD_TUNED = (
-    'friction and film of the feet, drag of the hoses, share and length of wet patches'
-)
 
 Walks = Mapping[tuple[str, int], Trial]
 
@@ -104,20 +96,6 @@ def draw(walks: Walks, numbers: Collection[int] = NUMBERS) -> list[Explained]:
 
 # --- the leg on its rail -------------------------------------------------------------------------
 
-_RAIL_MEASURED = (
-    'Nothing: the thesis gives no numbers of points. Its text gives the order of the five cases, '
-    'and "approximately five times" between flat and 75 kPa on wet ground.'
-)
-_RAIL_MODELLED = (
-    'A body on wheels on a rail, pushed by one foot (L0): the capacity of the foot follows from '
-    'its pads, their pressure, and the film of liquid that drains from under them.'
-)
-_RAIL_ASSUMED = (
-    'Mass, rolling drag, load of the springs, stroke and times of the gait; the friction of the '
-    'foot, 19 pads, and the film of 0.3 mm. The drag of 0.235 N is chosen to give the factor of '
-    'five, so that the agreement is no evidence.'
-)
-
 
 def _figure_38(walks: Walks) -> Explained:
     shown = {name: RAIL[name][0] for name in ('leg_dry_flat', 'leg_wet_flat', 'leg_wet_dome_75')}
@@ -155,58 +133,35 @@ def _figure_38(walks: Walks) -> Explained:
         ],
     )
     stroke = 1e3 * walks['leg_dry_flat', 0].settings['stride_m']
-    return Explained(
+    return explained(
         38,
-        Drawn(
-            figure,
-            'Figure 38: path of the foot on the rail',
-            'Paths of the foot over four gait cycles. Slip in a cycle: '
-            + ', '.join(f'{shown[name]} {slip:.1f} mm' for name, slip in slips.items()),
-            'Four gait cycles, the third to the sixth, as the marker on the foot shows them.',
-        ),
-        _RAIL_MEASURED,
-        _RAIL_MODELLED,
-        _RAIL_ASSUMED,
+        figure,
         _claims_38(slips, stroke),
+        alt='Paths of the foot over four gait cycles. Slip in a cycle: '
+        + ', '.join(f'{shown[name]} {slip:.1f} mm' for name, slip in slips.items()),
     )
 
 
 def _claims_38(slips: Mapping[str, float], stroke: float) -> tuple[Claim, ...]:
     dry, wet, dome = slips.values()
     return (
-        Claim(
-            38,
-            'Dry, the flat foot does not slip.',
+        claim(
+            'dry the flat foot',
             f'It slips {dry:.1f} mm a cycle, of a stroke of {stroke:g} mm (1 walk, L0).',
             (dry,),
             dry <= STRAIGHT * stroke,
-            _RAIL_SECTION,
-            rule=f'Up to {100.0 * STRAIGHT:g} % of the stroke. {_DEMAND}',
-            tuned=_RAIL_TUNED,
-            see=_RAIL_NUMBERS,
         ),
-        Claim(
-            38,
-            'Wet, the flat foot slips back and hardly pushes the body.',
+        claim(
+            'wet the flat foot',
             f'It slips {wet:.1f} of {stroke:g} mm (1 walk, L0).',
             (wet,),
             wet > 0.5 * stroke,
-            _RAIL_SECTION,
-            rule='More than half of the stroke.',
-            tuned=_RAIL_TUNED,
-            see=_RAIL_NUMBERS,
         ),
-        Claim(
-            38,
-            'Wet, domes of high pressure hardly slip.',
+        claim(
+            'wet domes of high',
             f'They slip {dome:.1f} of {stroke:g} mm (1 walk, L0).',
             (dome,),
             dome <= MINIMAL * stroke,
-            _RAIL_SECTION,
-            rule=f'Up to {100.0 * MINIMAL:g} % of the stroke. Rigid discs of film: soft domes '
-            'need a load that comes in 0.1 s.',
-            tuned=_RAIL_TUNED,
-            see='model/film.md#when-a-scene-needs-it',
         ),
     )
 
@@ -233,22 +188,13 @@ def _figure_39(walks: Walks) -> Explained:
     ax.set_ylabel('distance of the body / mm')
     legend(figure, ax.get_legend_handles_labels()[0])
     less = advances['leg_wet_dome_75'] / advances['leg_dry_flat'] - 1.0
-    return Explained(
+    return explained(
         39,
-        Drawn(
-            figure,
-            'Figure 39: distance of the body in the five cases',
-            'Distance of the body over time; it is at the end of the rail after '
-            + ', '.join(f'{_seconds(times[name])} ({RAIL[name][0]})' for name in RAIL),
-            'Time counts from the first step. Flat feet and domes of 40 kPa walk alike.',
-        ),
-        _RAIL_MEASURED,
-        _RAIL_MODELLED,
-        _RAIL_ASSUMED
-        + ' By the thesis\' own force limits a dome of 40 kPa carries nothing and is pressed '
-        'flat.',
+        figure,
         _claims_39(times, less),
-    )  # fmt: skip
+        alt='Distance of the body over time; it is at the end of the rail after '
+        + ', '.join(f'{_seconds(times[name])} ({RAIL[name][0]})' for name in RAIL),
+    )
 
 
 def _claims_39(times: Mapping[str, float | None], less: float) -> tuple[Claim, ...]:
@@ -256,82 +202,42 @@ def _claims_39(times: Mapping[str, float | None], less: float) -> tuple[Claim, .
         float('inf') if each is None else each for each in times.values()
     )
     return (
-        Claim(
-            39,
-            'Domes of 75 kPa on wet ground walk like flat feet on dry ground.',
+        claim(
+            'domes of 75 kpa',
             f'They go {100.0 * abs(less):.0f} % less far in a cycle, and need '
             f'{high:.1f} s in place of {dry:.1f} s (1 walk each, L0).',
             (less,),
             abs(less) <= MINIMAL,
-            _RAIL_SECTION,
-            printed='alike, no number',
-            rule=f'Distance a cycle within {100.0 * MINIMAL:g} %.',
-            tuned=_RAIL_TUNED,
-            see=_RAIL_NUMBERS,
         ),
-        Claim(
-            39,
-            'Wet, flat feet need several times as long as domes of 75 kPa.',
+        claim(
+            'wet flat feet need',
             f'{flat / high:.1f} times: {flat:.1f} and {high:.1f} s (1 walk each, L0). With one '
             'assumed number halved or doubled 1.3 to 7.2 times, or the flat foot never arrives.',
             (flat / high,),
             abs(flat / high / 5.0 - 1.0) <= ABOUT,
-            _RAIL_SECTION,
-            printed='5 times, approximately',
-            rule=f'Within {100.0 * ABOUT:g} %. A threshold: 1 % of friction moves it by 4 %.',
-            tuned=_RAIL_TUNED,
-            see=_RAIL_NUMBERS,
         ),
-        Claim(
-            39,
-            'Of 40, 60 and 75 kPa the higher is the better.',
+        claim(
+            'of 40 60 and',
             f'{low:.1f}, {middle:.1f} and {high:.1f} s to the goal (1 walk each, L0).',
             (low, middle, high),
             low > middle > high,
-            _RAIL_SECTION,
-            printed='order only',
-            rule='That order. By the measured line domes of 40 kPa are pressed flat; by other '
-            'criteria they stand, and the order is kept by films that drain.',
-            tuned=_RAIL_TUNED + ', criterion of the force limit',
-            see=_RAIL_NUMBERS,
         ),
     )
 
 
 # --- the hexapod ---------------------------------------------------------------------------------
 
-_HEXAPOD_MEASURED = (
-    'Nothing: the thesis gives no numbers of points, and the axes of its picture are not legible. '
-    'Its text states which cases slip and deviate.'
-)
-_HEXAPOD_MODELLED = (
-    'The hexapod with joints (L2, MuJoCo), open loop, on three floors with gaps in their liquid; '
-    'the capacity of its feet follows from pads, pressure and film.'
-)
-_HEXAPOD_ASSUMED = (
-    'The robot (Lynxmotion CH3-R), its gait, the friction of the feet, and what makes low '
-    'friction matter: 3 N of hoses that it drags, and gaps in the liquid (85 % wet, '
-    'patches of 0.5 m). Wet all over, the walk slows but stays straight.'
-)
-
 
 def _feet(walks: Walks, number: int, floor: str) -> Explained:
     middle, others = _slips_by_case(walks, floor)
     stride = 1e3 * walks[f'hexapod_{floor}_dry_flat', SEEDS[0]].settings['stride_m']
-    return Explained(
+    return explained(
         number,
-        Drawn(
-            _draw_feet(walks, floor),
-            f'Figure {number}: feet of legs 2 and 5 on the {floor} floor',
-            f'Path of feet 2 and 5 over time on the {floor} floor. Slip in a cycle: '
-            + ', '.join(f'{CASES[case][0]} {each.mean():.0f} mm' for case, each in middle.items()),
-            f'Five gait cycles of seed {SEEDS[0]}, the sixth to the tenth, as markers on the feet '
-            'show them.',
-        ),
-        _HEXAPOD_MEASURED,
-        _HEXAPOD_MODELLED,
-        _HEXAPOD_ASSUMED,
+        _draw_feet(walks, floor),
         _slip_claims(number, middle, others, stride),
+        alt=f'Path of feet 2 and 5 over time on the {floor} floor. Slip in a cycle: '
+        + ', '.join(f'{CASES[case][0]} {each.mean():.0f} mm' for case, each in middle.items()),
+        title=f'Figure {number}: feet of legs 2 and 5 on the {floor} floor',
     )
 
 
@@ -386,52 +292,35 @@ def _slip_claims(number: int, middle: Slips, others: Slips, stride: float) -> tu
     ratio = middle['wet_flat'] / others['wet_flat']
     seeds = f'{len(SEEDS)} floors, L2'
     return (
-        Claim(
-            number,
-            'Dry, nothing slips.',
+        claim(
+            'dry nothing slips',
             f'Feet slip at most {largest:.0f} mm a cycle, of a stride of {stride:g} mm, when they '
             f'land ({seeds}).',
             (float(largest),),
             bool(largest <= MINIMAL * stride),
-            _HEXAPOD_SECTION,
-            rule=f'Up to {100.0 * MINIMAL:g} % of the stride. {_DEMAND}',
-            tuned=_HEXAPOD_TUNED,
-            see=_HEXAPOD_NUMBERS,
+            figure=number,
         ),
-        Claim(
-            number,
-            'Wet, flat feet slip.',
+        claim(
+            'wet flat feet slip',
             f'Legs 2 and 5 slip {_few(middle["wet_flat"])} mm a cycle, {_few(more, ".1f")} '
             f'times as much as on dry ground ({seeds}).',
             tuple(more.tolist()),
             bool(np.all(more > 2.0)),
-            _HEXAPOD_SECTION,
-            rule='More than twice as much, each time.',
-            tuned=_HEXAPOD_TUNED,
-            see=_HEXAPOD_NUMBERS,
+            figure=number,
         ),
-        Claim(
-            number,
-            'Domes take away much of that slip.',
+        claim(
+            'domes take away much',
             f'{_few(100.0 * left)} % of it remain: {_few(middle["wet_dome"])} mm ({seeds}).',
             tuple(left.tolist()),
             bool(np.all(left <= 0.5)),
-            _HEXAPOD_SECTION,
-            rule='At most half remains, each time.',
-            tuned=_HEXAPOD_TUNED,
-            see=_HEXAPOD_NUMBERS,
+            figure=number,
         ),
-        Claim(
-            number,
-            'Legs 2 and 5 slip sooner than the others, since F₁ = 2F₂ = 2F₃.',
+        claim(
+            'legs 2 and 5',
             f'Wet and flat they slip {_few(ratio, ".2f")} times as much as the others ({seeds}).',
             tuple(ratio.tolist()),
             bool(np.all(ratio > 1.0 + MINIMAL)),
-            _HEXAPOD_SECTION,
-            printed='twice the force',
-            rule=f'At least {100.0 * MINIMAL:g} % more. A foot that pushes twice as hard carries '
-            'twice the load, and by Coulomb is no nearer to slip.',
-            see='model/thesis_walks.md#legs-2-and-5',
+            figure=number,
         ),
     )
 
@@ -463,32 +352,24 @@ def _paths(walks: Walks, number: int, floor: str) -> Explained:
             Line2D([], [], color=BLACK, marker='s', ms=4.0, ls='', label='end'),
         ],
     )
-    return Explained(
+    return explained(
         number,
-        Drawn(
-            figure,
-            f'Figure {number}: path of the body on the {floor} floor',
-            f'Paths of the body on the {floor} floor. Aside at the end: '
-            + '; '.join(
-                f'{CASES[case][0]} {_few(each)} mm' for case, each in drifts.items()
-            ),
-            f'Fifteen gait cycles on {len(SEEDS)} floors, each with another seed. The scale of y '
-            'is larger than that of x.',
-        ),
-        _HEXAPOD_MEASURED,
-        _HEXAPOD_MODELLED,
-        _HEXAPOD_ASSUMED,
+        figure,
         _path_claims(number, drifts, shares),
-    )  # fmt: skip
+        alt=f'Paths of the body on the {floor} floor. Aside at the end: '
+        + '; '.join(f'{CASES[case][0]} {_few(each)} mm' for case, each in drifts.items()),
+        title=f'Figure {number}: path of the body on the {floor} floor',
+        caption=f'Fifteen gait cycles on {len(SEEDS)} floors, each with another seed. The scale '
+        'of y is larger than that of x.',
+    )
 
 
 def _path_claims(number: int, drifts: Slips, shares: Slips) -> tuple[Claim, ...]:
     seeds = f'{len(SEEDS)} floors, L2'
     straight = max(shares['dry_flat'].max(), shares['wet_dome'].max())
     return (
-        Claim(
-            number,
-            'Wet, flat feet leave the straight path.',
+        claim(
+            'wet flat feet leave',
             f'At the end the body is {_few(drifts["wet_flat"])} mm aside; on dry ground at '
             f'most {drifts["dry_flat"].max():.0f} mm ({seeds}).',
             tuple(drifts['wet_flat'].tolist()),
@@ -496,23 +377,15 @@ def _path_claims(number: int, drifts: Slips, shares: Slips) -> tuple[Claim, ...]
                 shares['wet_flat'].min() > STRAIGHT
                 and drifts['wet_flat'].min() > drifts['dry_flat'].max()
             ),
-            _HEXAPOD_SECTION,
-            rule=f'More than {100.0 * STRAIGHT:g} % of the distance, and than on dry ground, each '
-            'time. Wet all over, the walk slows and stays straight.',
-            tuned=_HEXAPOD_TUNED,
-            see=_HEXAPOD_NUMBERS,
+            figure=number,
         ),
-        Claim(
-            number,
-            'Wet, domes keep a path as straight as on dry ground.',
+        claim(
+            'wet domes keep a',
             f'At the end the body is {_few(drifts["wet_dome"])} mm aside, at most '
             f'{100.0 * straight:.1f} % of its distance ({seeds}).',
             tuple(drifts['wet_dome'].tolist()),
             bool(straight <= STRAIGHT),
-            _HEXAPOD_SECTION,
-            rule=f'Up to {100.0 * STRAIGHT:g} % of the distance.',
-            tuned=_HEXAPOD_TUNED,
-            see=_HEXAPOD_NUMBERS,
+            figure=number,
         ),
     )
 

@@ -7,10 +7,8 @@ below it, are integrated from far away inwards until the surface meets the wall.
 
 from __future__ import annotations
 
-import importlib
 import math
 import statistics
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -36,12 +34,11 @@ from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress
+from studies import command
 from studies.machine import spent_time
 from studies.work_precision import capillary_chart
 
 Pair = tuple[float, float]  # height, m, and force, N
-
-rivals = 'studies.work_precision.liquid_rivals'  # module of further rows, with its options
 
 SPHERE, REST = 1.55e-3, 0.583e-3  # m: the dome of the reference table
 TENSIONS = (0.004, 0.073)  # N/m: the thesis' highest, and water
@@ -54,7 +51,6 @@ BALANCES = ('thesis', 'force', 'energy')
 SIZES = ((25, 12, 12, 48), (100, 36, 48, 72), (100, 36, 100, 100), (400, 36, 100, 100))
 # Vertices round the pad, and how often triangles are halved.
 MINIMISED = ((12, 0), (24, 0), (24, 1))
-BIG = (100, 36, 100, 100)  # about 20 000 triangles
 EXACT = 'exact meniscus'
 
 
@@ -192,21 +188,11 @@ class Trap:
     true: str
 
 
-@dataclass(frozen=True)
-class Speed:
-    """Time of a computation on a mesh of many triangles; None if its package is not installed."""
-
-    kind: str
-    what: str
-    triangles: int
-    ms: float | None
-
-
-Row = Result | Trap | Speed
+Row = Result | Trap
 
 
 def measure(progress: Progress) -> list[Row]:
-    """Measure every method on every shape, the traps, and the speed.
+    """Measure every method on every shape, the traps, and the traps.
 
     Progress, 0 to 1, is reported to ``progress``.
     """
@@ -217,8 +203,6 @@ def measure(progress: Progress) -> list[Row]:
         begin = k * share
         rows += run(shape, lambda done, begin=begin: progress(begin + share * done))  # type: ignore[misc]
     rows += traps()
-    progress(0.95)
-    rows += speeds()
     progress(1.0)
     return rows
 
@@ -426,7 +410,7 @@ def _off(found: float | None, exact: float) -> float:
     return abs(found / exact - 1.0)
 
 
-# --- traps and speed -----------------------------------------------------------------------------
+# --- traps -----------------------------------------------------------------------------
 
 
 def traps() -> list[Trap]:
@@ -488,78 +472,8 @@ def traps() -> list[Trap]:
     return rows
 
 
-def speeds() -> list[Speed]:
-    """Return the time for a mesh of 20 000 triangles, here and with trimesh if it is installed."""
-    layers, slices, rings, sectors = BIG
-    mesh = SHAPES[0].mesh(rings, sectors)
-    triangles = len(mesh.faces)
-
-    def row(what: str, solve: Callable[[], Any] | None) -> Speed:
-        return Speed('speed', what, triangles, None if solve is None else _shortest(solve))
-
-    found = [
-        row(
-            f'wet, {balance}, {layers} layers × {slices} slices',
-            lambda b=balance: wet(mesh, WATER, b, layers, slices),  # type: ignore[misc]
-        )
-        for balance in ('energy', 'force')
-    ]
-    what = f'trimesh: {layers} sections alone, one by one'
-    try:
-        # trimesh is no dependency; it is measured only if it is installed.
-        trimesh = importlib.import_module('trimesh')
-    except ImportError:
-        return [*found, row(what, None)]
-    other = trimesh.Trimesh(mesh.points, mesh.faces, process=False)
-    heights = (np.arange(layers) + 0.5) / layers * mesh.height
-
-    def sections() -> None:
-        for z in heights:
-            trimesh.intersections.mesh_plane(other, (0.0, 0.0, 1.0), (0.0, 0.0, z))
-
-    def together() -> None:
-        trimesh.intersections.mesh_multiplane(other, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), heights)
-
-    named = f'trimesh {trimesh.__version__}: {layers} sections alone'
-    return [*found, row(f'{named}, one by one', sections), row(f'{named}, together', together)]
-
-
-def _shortest(solve: Callable[[], Any], repeats: int = 5) -> float:
-    times = []
-    for _ in range(repeats):
-        begun = time.perf_counter()
-        solve()
-        times.append(time.perf_counter() - begun)
-    return 1e3 * min(times)
-
-
-# --- table ---------------------------------------------------------------------------------------
-
-
 def table(rows: Sequence[Row]) -> str:
     """Return the rows as text."""
-    lines = []
-    results = [row for row in rows if isinstance(row, Result)]
-    for name in dict.fromkeys(result.shape for result in results):
-        part = [result for result in results if result.shape == name]
-        lines += [
-            f'{name}: height and force against the exact meniscus of a wide bath',
-            f'  {"method":14} {"size":30} {"ms":>7}  {"height: median":>14} {"worst":>7}'
-            f'  {"force: median":>14} {"worst":>7}  cases  dry  refused  false',
-        ]
-        lines += [
-            f'  {result.family:14} {result.size:30} {result.ms_per_solve:7.3g}'
-            f'  {result.height_error:14.1e} {result.worst_height_error:7.1e}'
-            f'  {result.force_error:14.1e} {result.worst_force_error:7.1e}'
-            f'  {len(result.cases):5d}  {result.dry:3d}  {result.refused:7d}  {result.false:5d}'
-            for result in part
-        ]
-        lines.append('')
-    lines.append('inputs that make methods fail')
-    traps_ = [row for row in rows if isinstance(row, Trap)]
-    lines += [f'  {t.method:14} {t.given:38} gives {t.answer}; true: {t.true}' for t in traps_]
-    lines.append('')
-    for speed in (row for row in rows if isinstance(row, Speed)):
-        took = 'not installed' if speed.ms is None else f'{speed.ms:.0f} ms'
-        lines.append(f'{speed.what}, {speed.triangles} triangles: {took}')
-    return '\n'.join([*lines, ''])
+    kinds = (Result, Trap)
+    parts = ([vars(row) for row in rows if isinstance(row, kind)] for kind in kinds)
+    return '\n\n'.join(map(command.listed, parts))

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.reports.style import legend
-from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PAPER_STYLE, PURPLE, VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, PALE, PAPER_STYLE, PURPLE, VERMILION
 
 if TYPE_CHECKING:
     from studies.work_precision.capillary import Result
@@ -26,7 +26,6 @@ LOOKS = {
     'force': (BLUE, 's', 'layers, force'),
     'energy': (GREEN, '^', 'layers, energy'),
     'minimised': (PURPLE, 'D', 'surface of least energy'),
-    'Surface Evolver': (ORANGE, 'P', 'Surface Evolver, a twelfth'),
     'exact meniscus': (BLACK, '*', 'exact meniscus'),
 }
 

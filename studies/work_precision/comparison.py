@@ -226,29 +226,7 @@ def _attempt(method: Method, values: tuple[float, ...]) -> None:
         method.solve(*values)
 
 
-# --- table and picture ---------------------------------------------------------------------------
-
-
-def table(results: Sequence[Result]) -> str:
-    """Return the results as text, one block for each problem."""
-    lines = []
-    for name in dict.fromkeys(result.problem for result in results):
-        part = [result for result in results if result.problem == name]
-        width = max(len(result.method) for result in part)
-        lines += [
-            f'{name} ({part[0].cases} cases; times against {part[0].baseline})',
-            f'  {"method":{width}}  us/solve      ratio   median error  worst error'
-            '  failures  of these wrong',
-        ]
-        for result in part:
-            ratio = f'1/{1 / result.versus:.0f}' if result.versus < 0.5 else f'{result.versus:.2g}'
-            lines.append(
-                f'  {result.method:{width}}  {result.us_per_solve:8.4g} {ratio:>10}'
-                f'   {result.median_error:12.1e} {result.error:12.1e}'
-                f'  {result.failures:8d}  {result.wrong:14d}'
-            )
-        lines.append('')
-    return '\n'.join(lines)
+# --- picture ---------------------------------------------------------------------------
 
 
 WIDTH = 9.0

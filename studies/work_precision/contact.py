@@ -23,7 +23,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy.integrate import quad
-from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.optimize import brentq, fsolve
 
 from ros_pad.contact import LARGE_PAD, force_limit, inflate, press
@@ -135,37 +134,6 @@ def _free_brentq(pressure: float) -> float:
     return float(brentq(_free_residual, 1e-7, 0.05, args=(pressure,), xtol=1e-16))
 
 
-# Thesis 3.60 is P² = 4 (1 - c²)(3 - 2c)² for the cosine c of the half-angle. These are the
-# coefficients of this quartic from c⁴ down to c; the constant one depends on the pressure.
-_QUARTIC = (1.0, -3.0, 1.25, 3.0)
-
-
-def _free_quartic(pressure: float) -> float:
-    tension = pressure * _R / _K
-    roots = np.roots([*_QUARTIC, (tension * tension - 36.0) / 16.0])
-    cosine = max(root.real for root in roots if abs(root.imag) < 1e-9)
-    return _R * math.sqrt(1.0 - cosine * cosine) / cosine
-
-
-def _free_ferrari(pressure: Array) -> Array:
-    """Return the heights by Ferrari's formula for the quartic of 3.60 in the cosine c."""
-    # The quartic is y⁴ + p y² + q y + s in y = c - 3/4. Its resolvent has one real root, found by
-    # Cardano's formula.
-    p, q, s = -2.125, 1.5, ((pressure * (_R / _K)) ** 2 - 36.0) / 16.0 + 2.00390625
-    linear = -p * p / 12.0 - s
-    constant = 2.0 * p**3 / 27.0 - p * (p * p / 4.0 - s) / 3.0 - q * q / 8.0
-    spread = np.sqrt(constant**2 / 4.0 + linear**3 / 27.0)
-    m = np.cbrt(-0.5 * constant + spread) + np.cbrt(-0.5 * constant - spread) - p / 3.0
-    root = np.sqrt(2.0 * m)
-    cosine = 0.75 + 0.5 * (np.sqrt(-2.0 * p - 2.0 * m + 2.0 * q / root) - root)
-    return _R * np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)) / cosine
-
-
-def _free_table() -> Callable[[Array], Array]:
-    nodes = np.linspace(0.0, 159e3, 4001)
-    return CubicSpline(nodes, inflate(PAD, nodes).height, extrapolate=False)
-
-
 def _free_methods(problem: Problem) -> tuple[Method, ...]:
     starts = dict(zip(problem.inputs['pressure_pa'].tolist(), problem.truth * _GOOD, strict=True))
     return (
@@ -173,9 +141,6 @@ def _free_methods(problem: Problem) -> tuple[Method, ...]:
         Method('fsolve, start at the pad radius', lambda p: _free_fsolve(p, _R)),
         Method(BASELINE, lambda p: _free_fsolve(p, starts[p])),
         Method('brentq', _free_brentq),
-        Method('quartic by np.roots', _free_quartic),
-        Method('quartic in closed form, batch', _free_ferrari, batch=True),
-        Method('table (cubic spline), batch', _free_table(), batch=True),
         Method('inflate', lambda p: inflate(PAD, p).height, ours=True),
         Method('inflate, batch', lambda p: inflate(PAD, p).height, batch=True, ours=True),
     )
@@ -283,15 +248,6 @@ def _pressed_fsolve(pressure: float, force: float, start: Start) -> float:
     return float(root[1]) if ended == 1 else math.nan
 
 
-def _pressed_fsolve_one(pressure: float, force: float, start: Start) -> float:
-    root, _, ended, _ = fsolve(
-        lambda unknown: _one_unknown(unknown.item(), pressure, force, math.sqrt),
-        start.height,
-        full_output=True,
-    )
-    return float(root[0]) if ended == 1 else math.nan
-
-
 def _pressed_brentq(pressure: float, force: float) -> float:
     free = inflate(PAD, pressure).height
     low = 1e-3 * free
@@ -310,31 +266,13 @@ def _residual_or_nan(height: float, pressure: float, force: float) -> float:
         return math.nan
 
 
-def _pressed_table() -> Callable[[Array, Array], Array]:
-    """Return an interpolating table over pressure and share of the flattening force."""
-    pressures, shares = np.linspace(2e3, 91.3e3, 180), np.linspace(0.0, 0.999, 180)
-    limits = force_limit(PAD, pressures, 'flattening')
-    heights = press(PAD, pressures[:, None], shares * limits[:, None]).height
-    spline = RectBivariateSpline(pressures, shares, heights)
-
-    def look_up(pressure: Array, force: Array) -> Array:
-        limit = np.interp(pressure, pressures, limits)
-        return np.asarray(spline.ev(pressure, force / limit))
-
-    return look_up
-
-
 def _pressed_methods(starts: dict[tuple[float, float], Start]) -> tuple[Method, ...]:
     cold = Start(1e-4, 1e-3)
     return (
         Method('mpmath, as vpasolve', _pressed_mpmath),
         Method('fsolve, start at 0.1 and 1 mm', lambda p, f: _pressed_fsolve(p, f, cold)),
         Method(BASELINE, lambda p, f: _pressed_fsolve(p, f, starts[p, f])),
-        Method(
-            'fsolve, one unknown, good start', lambda p, f: _pressed_fsolve_one(p, f, starts[p, f])
-        ),
         Method('brentq, one unknown', _pressed_brentq),
-        Method('table (bicubic), batch', _pressed_table(), batch=True),
         Method('press', lambda p, f: press(PAD, p, f).height, ours=True),
         Method('press, batch', lambda p, f: press(PAD, p, f).height, batch=True, ours=True),
     )
@@ -446,12 +384,7 @@ def failure_maps(size: int = 54, progress: Progress | None = None) -> list[Failu
     """
     methods: list[tuple[str, Callable[[float, float], float]]] = [
         ('mpmath, as vpasolve', _pressed_mpmath),
-        (
-            'fsolve, start at 0.1 and 1 mm',
-            lambda p, f: _pressed_fsolve(p, f, Start(1e-4, 1e-3)),
-        ),
-        ('fsolve, start at the free dome', _from_the_free_dome),
-        ('fsolve, random start', _RandomStart(seed=0)),
+        ('fsolve, start at 0.1 and 1 mm', lambda p, f: _pressed_fsolve(p, f, Start(1e-4, 1e-3))),
         ('brentq, one unknown', _pressed_brentq),
         ('press', lambda p, f: press(PAD, p, f).height),
     ]
@@ -472,21 +405,6 @@ def failure_maps(size: int = 54, progress: Progress | None = None) -> list[Failu
                 progress((number + (row + 1) / points) / len(methods))
         maps.append(FailureMap(name, pressures, shares, outcome))
     return maps
-
-
-def _from_the_free_dome(pressure: float, force: float) -> float:
-    return _pressed_fsolve(pressure, force, Start(0.01 * _R, inflate(PAD, pressure).height))
-
-
-class _RandomStart:
-    """Solver by fsolve from a random start: depth up to one, height up to two pad radii."""
-
-    def __init__(self, seed: int) -> None:
-        self._generator = np.random.default_rng(seed)
-
-    def __call__(self, pressure: float, force: float) -> float:
-        depth, height = self._generator.uniform(0.0, (_R, 2.0 * _R))
-        return _pressed_fsolve(pressure, force, Start(depth, height))
 
 
 def _outcome(

@@ -11,7 +11,6 @@ the liquid must then be inversely proportional to the stiffness.
 from __future__ import annotations
 
 import math
-import statistics
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -115,27 +114,6 @@ def _draw(rows: Sequence[dict[str, Any]]) -> Figure:
     return figure
 
 
-def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the rows as text."""
-    lines = [
-        'liquid          stiffer  pressure kPa  load N    gap %  contact radius %  height %'
-        '  force %  times as long'
-    ]
-    for row in rows:
-        head = f'{row["liquid"]:16}{row["stiffer"]:7.0f}{row["pressure"] / 1e3:14.0f}'
-        head += f'{row["load"]:8.3f}'
-        if row['status'] != 'ok':
-            lines.append(f'{head}  {row["status"]}')
-            continue
-        lines.append(
-            f'{head}{row["gap"]:9.3f}{row["contact_radius"]:18.3f}{row["height"]:10.3f}'
-            f'{row["force"]:9.3f}{row["ratio"]:15.0f}'
-        )
-    times = [row['time'] for row in rows if row['status'] == 'ok']
-    lines.append(f'median case: {statistics.median(times):.2f} s')
-    return '\n'.join(lines)
-
-
 def main(words: Sequence[str]) -> int:
     """Measure, print and draw."""
     parser = command.parser('coupling', __doc__)
@@ -145,5 +123,5 @@ def main(words: Sequence[str]) -> int:
     chosen = list(cases())[:: options.every]
     rows = [case(*each) for each in command.each(chosen, 'coupling', 'case')]
     kept = command.write(options.out, 'coupling', {'rows': rows}, {'coupling': draw(rows)})
-    command.show(options, kept, table(rows))
+    command.show(options, kept, command.listed(rows))
     return 0

@@ -18,14 +18,13 @@ import time
 import urllib.parse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ros_pad.contact import Foot
 from ros_pad.errors import PadError
-from ros_pad.reports.explore import FIELDS, Inputs
+from ros_pad.reports.explore import FIELDS, inputs_of
 from ros_pad.reports.explore_page import answer
 from ros_pad.reports.files import save
 from studies import command
@@ -122,16 +121,16 @@ def measure(page: Any, moves: int) -> dict[str, list[float]]:
 
 def computed(foot: str, moves: int) -> dict[str, list[float]]:
     """Return the processor times of the same answers without a page, ms, by slider."""
-    shipped = Inputs.of(Foot.load(foot))
+    shipped = inputs_of(Foot.load(foot))
     answer(shipped)
     found: dict[str, list[float]] = {}
     for field in FIELDS:
         inputs = shipped
         for _ in range(moves):
-            down = getattr(shipped, field.name) > 0.5 * (field.low + field.high) * field.unit
+            down = shipped[field.name] > 0.5 * (field.low + field.high) * field.unit
             step = -field.step if down else field.step
-            moved = getattr(inputs, field.name) + step * field.unit
-            inputs = replace(inputs, **{field.name: moved})
+            moved = inputs[field.name] + step * field.unit
+            inputs = inputs | {field.name: moved}
             start = time.process_time()
             answer(inputs)
             found.setdefault(field.name, []).append(1e3 * (time.process_time() - start))
@@ -161,19 +160,18 @@ def main(words: Sequence[str]) -> int:
                     save(options.out / 'explore.png', page.screenshot(full_page=True))
                 times[foot] = measure(page, options.moves)
                 page.close()
-    lines = [f'{"":24}{"page, ms":>16}{"processor, ms":>16}']
-    lines += [f'{"foot":12}{"slider":12}' + 2 * f'{"median":>8}{"95 %":>8}']
+    rows = []
     for foot, found in times.items():
         for name in (*found, 'all'):
-            line = f'{foot:12}{name:12}'
-            for each in (found, alone[foot]):
-                row = each.get(name) or [time for row in each.values() for time in row]
-                line += ''.join(f'{value:8.0f}' for value in np.quantile(row, (0.5, 0.95)))
-            lines.append(line)
+            row: dict[str, Any] = {'foot': foot, 'slider': name}
+            for word, each in (('page, ms', found), ('processor, ms', alone[foot])):
+                own = each.get(name) or [time for some in each.values() for time in some]
+                row[f'{word}: median, 95 %'] = np.quantile(own, (0.5, 0.95)).tolist()
+            rows.append(row)
     load = os.getloadavg()[0]
-    lines.append(f'{load:.1f} processes on {os.cpu_count()} cores in the last minute')
+    title = f'{load:.1f} processes on {os.cpu_count()} cores in the last minute'
     kept = command.write(
         options.out, 'explore', {'load': load, 'times_ms': times, 'processor_ms': alone}
     )
-    command.show(options, kept, '\n'.join(lines))
+    command.show(options, kept, command.listed(rows, title))
     return 0

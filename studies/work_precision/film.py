@@ -37,7 +37,7 @@ from studies import command
 from studies.closed_loop import loops
 from studies.drawing import BLUE, GREEN, ORANGE, PALE, STYLE, VERMILION
 from studies.samples import runs
-from studies.work_precision.comparison import Method, Problem, Result, run, table
+from studies.work_precision.comparison import Method, Problem, Result, run
 
 RADIUS, LOAD, DEPTH = 1.5e-3, 0.3, 3e-4  # m, N, m
 MEAN = LOAD / (math.pi * RADIUS**2)
@@ -151,16 +151,6 @@ def compare() -> list[Result]:
     for each, methods in command.each(pairs, 'methods', 'problem'):
         results += run(each, methods, 'Stefan-Reynolds')
     return results
-
-
-def tolerances() -> list[dict[str, float]]:
-    """Return the largest relative error of a film of 50 rings in time, by tolerance."""
-    exact = sole(3.95e5, [1e-4, 1e-3], 50, 1e-10).thickness
-    rows = []
-    for tolerance in command.each([1e-2, 1e-3, 1e-4, 1e-5, 1e-6], 'tolerances', 'tolerance'):
-        film = sole(3.95e5, [1e-4, 1e-3], 50, tolerance).thickness
-        rows.append({'tolerance': tolerance, 'error': float(np.max(np.abs(film / exact - 1.0)))})
-    return rows
 
 
 # --- the thesis' pad, and the rule ---------------------------------------------------------------
@@ -354,58 +344,6 @@ def _shapes(panel: Any, film: Squeezed, radius: float, pressure: float) -> None:
     panel.legend(frameon=False, fontsize=7)
 
 
-def _texts(document: dict[str, Any]) -> list[str]:
-    lines = ['flat pad, 0.3 N: mean and middle film, um; dry contact, % (1 s and 3 s)']
-    for row in document['soles']:
-        lines.append(
-            f'  {row["sole"]:31} lens {1e6 * row["lens_mean_m"]:8.3g}'
-            f'  mean {_um(row["mean_m"])}  middle {_um(row["middle_m"])}'
-            f'  rim at 0.5 um after {row["rim_closed_s"]:.2g} s  dry {_share(row["dry"])}'
-            f'  ({row["status"]})'
-        )
-    first = document['soles'][0]
-    lines.append(f'  rigid: {_um(first["rigid_m"])}  dry {_share(first["rigid_dry"])}')
-    lines.append('dome of 75 kPa: film in the middle and at the rim, um; dry contact (0.3 s, 1 s)')
-    for row in document['domes']:
-        lines.append(
-            f'  {row["load_n"]:5.3f} N  middle {_um(row["middle_m"])}  rim {_um(row["rim_m"])}'
-            f'  dry {_share(row["dry"])}  rigid {_um(row["rigid_m"])}'
-            f'  dry {_share(row["rigid_dry"])}'
-        )
-    lines.append('time in which load grows; mean film, um, and dry: flat pad, dome of 0.19 N')
-    lines += [
-        f'  {row["rise_s"]:5g} s  {_um([row["flat_mean_m"]])}  {_share([row["flat_dry"]])}'
-        f'  {_um([row["dome_mean_m"]])}  {_share([row["dome_dry"]])}'
-        for row in document['rises']
-    ]
-    lines.append('walks, L2: ms from 10 to 50 % and to 90 % of the load (5, 50, 95 % of stances)')
-    lines += [
-        f'  {row["scene"]:18} {_ms(row["half_s"])}  {_ms(row["rise_s"])}  n = {row["stances"]}'
-        f'  dome dry {_share(row["dry"])}'
-        for row in document['landings']
-    ]
-    lines.append('largest error of any ring in time, by tolerance (50 rings)')
-    lines += [f'  {row["tolerance"]:g}  {row["error"]:.1e}' for row in document['tolerances']]
-    lines.append('excess of the mean film over Stefan-Reynolds, by mean dimple over that film')
-    lines += [
-        f'  {row["dimple_over_film"]:8.4f}  {100.0 * row["excess"]:7.2f} %'
-        for row in document['rule']
-    ]
-    return lines
-
-
-def _um(values: Sequence[float]) -> str:
-    return ' '.join(f'{1e6 * value:.3g}' for value in values)
-
-
-def _ms(values: Sequence[float]) -> str:
-    return ' '.join(f'{1e3 * value:.2g}' for value in values)
-
-
-def _share(values: Sequence[float]) -> str:
-    return ' '.join(f'{100.0 * value:.3g} %' for value in values)
-
-
 def main(words: Sequence[str]) -> int:
     """Measure, print and draw."""
     parser = command.parser('film', __doc__)
@@ -418,9 +356,10 @@ def main(words: Sequence[str]) -> int:
         'domes': domes(),
         'rises': rises(),
         'landings': landings(),
-        'tolerances': tolerances(),
         'rule': rule(),
     }
     kept = command.write(options.out, 'film', document, {'film': draw(results)})
-    command.show(options, kept, '\n'.join([table(results), *_texts(document)]))
+    parts = ('rows', 'soles', 'domes', 'rises', 'landings', 'rule')
+    texts = (command.listed(document[part], f'\n{part}') for part in parts)
+    command.show(options, kept, '\n'.join(texts))
     return 0

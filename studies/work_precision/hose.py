@@ -111,12 +111,6 @@ def main(words: Sequence[str]) -> int:
     cost = step_cost()
     document = {'step_s': cost, 'regulator_s': alone, 'rows': rows}
     kept = command.write(options.out, 'hose', document, {'hose': draw(rows, alone)})
-    lines = [
-        f'a step takes {1e6 * cost:.1f} us; the regulator alone takes {alone:.3f} s',
-        f'hoses of {", ".join(f"{length:g}" for length in PRINTED)} m, with regulator',
-    ]
-    for row in rows:
-        times = ' '.join(f'{time:.3f} s' for time in row['printed_s'])
-        lines.append(f'{row["pad"]}, {1e3 * row["bore_m"]:.0f} mm: {times}')
-    command.show(options, kept, '\n'.join(lines))
+    title = f'a step takes {1e6 * cost:.1f} us; the regulator alone takes {alone:.3f} s'
+    command.show(options, kept, command.listed(rows, title))
     return 0

@@ -312,25 +312,15 @@ def run(folder: pathlib.Path | None, repeats: int, walks: int) -> dict[str, Any]
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return the tables of the documentation."""
-    lines = [
-        '| contact | ρ/R | method | surface outside, inside, % | largest moment, % |'
-        ' force and moment of a motion, % | time, µs |',
-        '|---|---|---|---|---|---|---|',
+    """Return errors and times by contact and method, and the walks."""
+    rows = [
+        {'contact': name, 'rho/R': row['own_turning'], 'method': method, **found}
+        for name, row in document['contacts'].items()
+        for method, found in row['methods'].items()
     ]
-    for name, row in document['contacts'].items():
-        for method, each in row['methods'].items():
-            lines.append(
-                f'| {name} | {row["own_turning"]:.3f} | {method} |'
-                f' {100 * each["outside"]:+.1f}, {100 * each["inside"]:+.1f} |'
-                f' {100 * each["moment"]:.1f} | {100 * each["motion"]:.1f} |'
-                f' {1e6 * each["seconds"]:.3g} |'
-            )
-    for policy, seed, shipped, own in document['walks']:
-        lines.append(
-            f'{policy}, seed {seed}: {shipped:.4f} m; {1e2 * (own / shipped - 1.0):+.4f} %'
-        )
-    return '\n'.join(lines)
+    names = ('policy', 'seed', 'shipped, m', 'own radius, m')
+    walks = [dict(zip(names, walk, strict=True)) for walk in document['walks']]
+    return f'{command.listed(rows)}\n{command.listed(walks)}'
 
 
 def draw(document: dict[str, Any]) -> Figure:

@@ -55,16 +55,9 @@ def main(words: Sequence[str]) -> int:
     rows = measure('one pad', SINGLE, single, layers.BALANCES, on_one)
     rows += measure('pattern', ('AGREEMENT', 'WIDEST_GAP'), many, ('energy', 'force'), between)
     rows += measure('volume', ('WIDEST_GAP',), many, ('energy', 'force'), volumes)
-    lines = [f'{len(single)} cases of one pad, {len(many)} of patterns']
-    lines.append(
-        'what     limit              value  balance   given    off by %  refused    off by %'
-    )
-    for row in rows:
-        lines.append(
-            f'{row["what"]:8} {row["limit"]:16}{row["value"]:8.3g}  {row["balance"]:7}'
-            f'{shown(row["given"])}{shown(row["refused"])}'
-        )
-    command.show(options, rows, '\n'.join(lines))
+    title = f'{len(single)} cases of one pad, {len(many)} of patterns: errors, least, most'
+    shown = [row | {word: _range(row[word]) for word in ('given', 'refused')} for row in rows]
+    command.show(options, rows, command.listed(shown, title))
     return 0
 
 
@@ -97,11 +90,8 @@ def scaled(names: tuple[str, ...]) -> Iterator[tuple[str, float]]:
             yield name, min(value, 0.5 * math.pi) if name == '_STEEP' else value
 
 
-def shown(errors: Sequence[float]) -> str:
-    """Return the number of errors, the lowest and the highest, as text."""
-    if not errors:
-        return f'{0:8}           -'
-    return f'{len(errors):8}{100.0 * min(errors):+6.0f}{100.0 * max(errors):+6.0f}'
+def _range(errors: Sequence[float]) -> tuple[float, ...]:
+    return (len(errors), min(errors), max(errors)) if errors else (0,)
 
 
 def on_one(case: Case, balance: str) -> tuple[float, float]:

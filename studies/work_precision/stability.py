@@ -1,30 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Find inputs at which simulations of a walking robot fail, with plain methods and with ours.
+"""Find inputs at which simulations of a walking robot fail, with other methods and with ours.
 
-In each of seven cases, plain methods and those of ros_pad get the same inputs. A number measures
-the failure, and a law predicts at which inputs and by how much a plain method must fail.
+In each of four cases, other methods and those of ros_pad get the same inputs. A number measures
+the failure, and a law predicts at which inputs and by how much a method must fail.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 import random
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
-from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.planar_robot import GRAVITY, PlanarRobot
 from ros_pad.simulation.pneumatics import (
     ATMOSPHERE,
     REFERENCE_DENSITY,
@@ -35,19 +36,18 @@ from ros_pad.simulation.pneumatics import (
     conductance,
 )
 from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.scene import LeggedBody, RailBody, Scene, Tow
-from studies.work_precision.friction import Contact, Twist, creeping, elastic, exact_stick
+from ros_pad.simulation.scene import LeggedBody, RailBody, Scene
+from studies import command
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PAPER_STYLE, PURPLE, VERMILION
+from studies.work_precision.friction import Contact, Twist, elastic, exact_stick
 
-Step = Callable[[Twist, float, float, Sequence[Contact], float, Twist], Twist]
-
-STILL: Twist = (0.0, 0.0, 0.0)
-LEGS = (1, 3, 5)  # one tripod
 # The hexapod of the shipped scenes, standing on one of its tripods.
 _SCENE = Scene.load('hexapod_smooth_dry_flat')
 assert isinstance(_SCENE.body, LeggedBody)
 BODY: LeggedBody = _SCENE.body
 MASS, INERTIA, WEIGHT = BODY.mass, BODY.inertia, BODY.mass * GRAVITY
-TRIPOD = tuple(BODY.homes[leg - 1] for leg in LEGS)
+MASSES = np.diag([MASS, MASS, INERTIA])
+TRIPOD = tuple(BODY.homes[leg - 1] for leg in (1, 3, 5))
 STIFFNESS = _SCENE.foot.shear_stiffness
 
 
@@ -60,12 +60,10 @@ class Outcome:
     case, method : str
     ours : bool
         Whether the method belongs to ros_pad.
-    input : str
-        Name and unit of the varied quantity.
+    input, measure : str
+        Name and unit of the varied quantity, and of the measure of failure.
     at : float
         Value of the varied quantity.
-    measure : str
-        Name and unit of the measure of failure.
     value : float or None
         Value of the measure; None if the method reports that it has no result.
     law : float or None
@@ -85,204 +83,49 @@ class Outcome:
     fails: bool
 
 
-@dataclass(frozen=True)
-class Case:
-    """Common attributes of the outcomes of a case, see :class:`Outcome`."""
-
-    name: str
-    input: str
-    measure: str
-
-    def of(
-        self, method: str, at: float, value: float | None, law: float | None, fails: bool
-    ) -> Outcome:
-        """Return the outcome of a method at a value of the input."""
-        ours = method in OURS or method in (CHANNEL, VERDICT) or method.startswith(RAIL)
-        return Outcome(self.name, method, ours, self.input, at, self.measure, value, law, fails)
-
-
 def measure(progress: Progress) -> list[Outcome]:
-    """Return the outcomes of all cases; report progress, 0 to 1, to ``progress``.
-
-    The case of MuJoCo is left out if MuJoCo is not installed.
-    """
+    """Return the outcomes of all cases; report progress, 0 to 1, to ``progress``."""
     outcomes: list[Outcome] = []
-    for number, case in enumerate(CASES):
-        progress(number / len(CASES))
-        try:
-            outcomes += case()
-        except ModuleNotFoundError as error:
-            if error.name != 'mujoco':
-                raise
+    for number, case in enumerate((creep, slipping_feet, filling, threshold)):
+        progress(number / 4)
+        outcomes += case()
     progress(1.0)
     return outcomes
 
 
-def figures(outcomes: list[Outcome], progress: Progress | None = None) -> dict[str, Figure]:
-    """Return the picture, by name: a panel for each case."""
-    from studies.work_precision import stability_chart
-
-    return {'stability': stability_chart.draw(outcomes)}
-
-
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Return the outcomes as text, a block for each case and a line for each method."""
-    lines = []
+    """Return the outcomes as text, a line for each case and method."""
+    rows = []
     for name in dict.fromkeys(outcome.case for outcome in outcomes):
-        case = [outcome for outcome in outcomes if outcome.case == name]
-        methods = list(dict.fromkeys(outcome.method for outcome in case))
-        width = max(map(len, methods))
-        lines += [
-            f'{name} ({case[0].input}: {case[0].measure})',
-            f'  {"method":{width}}  inputs  failures  first at  least value  worst value'
-            '  off the law by',
-        ]
-        for method in methods:
-            part = [outcome for outcome in case if outcome.method == method]
-            failed = [outcome.at for outcome in part if outcome.fails]
-            values = [outcome.value for outcome in part if outcome.value is not None]
-            misses = [
-                abs(outcome.value / outcome.law - 1.0)
-                for outcome in part
-                if outcome.value is not None and outcome.law
-            ]
-            least, worst = (
-                (f'{min(values):11.3g}', f'{max(values):11.3g}') if values else (f'{"-":>11}',) * 2
-            )
-            lines.append(
-                f'  {method:{width}}  {len(part):6d}  {len(failed):8d}'
-                f'  {f"{min(failed):.3g}" if failed else "-":>8}  {least}  {worst}'
-                f'  {f"{100.0 * max(misses):.2g} %" if misses else "-":>14}'
-            )
-        lines.append('')
-    if all(outcome.case != CREEP.name for outcome in outcomes):
-        lines += [f'{CREEP.name}: {NEEDS_MUJOCO}', '']
-    return '\n'.join(lines)
+        for method, part in _methods([row for row in outcomes if row.case == name]).items():
+            rows.append({
+                'case': f'{name}, {part[0].input}: {part[0].measure}',
+                'method': method,
+                'inputs': len(part),
+                'failures': sum(row.fails for row in part),
+                'first at': min((row.at for row in part if row.fails), default=None),
+                'worst value': max((row.value or 0.0 for row in part), default=None),
+            })  # fmt: skip
+    return command.listed(rows)
 
 
-def _exact_stick(
-    free: Twist,
-    mass: float,
-    inertia: float,
-    contacts: Sequence[Contact],
-    dt: float,
-    start: Twist,
-) -> Twist:
-    return exact_stick(free, mass, inertia, contacts, dt)
-
-
-OURS: dict[str, Step] = {
-    'elastic': elastic,
-    'creeping': creeping,
-    'exact_stick': _exact_stick,
-}
-
-
-def tripod_feet(
-    caps: Sequence[float], stiffness: Sequence[float] = (STIFFNESS,) * len(TRIPOD)
-) -> list[Contact]:
-    """Return the feet of the tripod on level ground, with caps, N, and stiffnesses, N/m."""
-    feet = []
-    for lever, cap, spring in zip(TRIPOD, caps, stiffness, strict=True):
-        foot = Contact(spring)
-        foot.lever_x, foot.lever_y = lever
-        foot.cap = cap
-        feet.append(foot)
-    return feet
-
-
-# --- a: explicit friction ------------------------------------------------------------------------
-
-EXPLICIT = Case('explicit friction', 'step, s', 'mean speed of the feet, m/s')
-STEPS = tuple(float(dt) for dt in np.geomspace(5e-5, 0.02, 27))
-FRICTION = 0.1
-SOFTENING = 1e-3  # m/s: slip speed below which the friction of the plain methods is linear
-KICK = 1e-6  # m/s: speed of a foot at the start, and limit above which its speed is chatter
-_COUNT = 400  # steps
-
-# Largest stable product of step and decay rate: there the growth factor R of a linear decay has
-# |R| = 1.
-STABLE = {'explicit Euler': 2.0, 'RK4': 2.785293563405282}
-
-
-def step_limits(softening: float = SOFTENING) -> dict[str, float]:
-    """Return the longest step of explicit Euler, s: ``sliding``, ``turning``.
-
-    Friction c s/√(s² + v²) has the slope c/v at rest, so that sliding decays at the rate Σc/(m v)
-    and turning at Σc r²/(I v). Explicit Euler is stable for steps below 2 over these rates.
-    """
-    cap = FRICTION * WEIGHT / len(TRIPOD)
-    turning = sum(cap * (x * x + y * y) for x, y in TRIPOD)
+def _methods(case: Sequence[Outcome]) -> dict[str, list[Outcome]]:
     return {
-        'sliding': 2.0 * MASS * softening / (FRICTION * WEIGHT),
-        'turning': 2.0 * INERTIA * softening / turning,
+        name: [outcome for outcome in case if outcome.method == name]
+        for name in dict.fromkeys(outcome.method for outcome in case)
     }
 
 
-def _friction_rates(twist: Twist, feet: Sequence[Contact]) -> Twist:
-    """Return the accelerations under friction c s/√(s² + v²)."""
-    fx = fy = moment = 0.0
-    for foot in feet:
-        sx, sy = foot.slip(twist)
-        gain = -foot.cap / math.sqrt(sx * sx + sy * sy + SOFTENING * SOFTENING)
-        fx += gain * sx
-        fy += gain * sy
-        moment += gain * (foot.lever_x * sy - foot.lever_y * sx)
-    return fx / MASS, fy / MASS, moment / INERTIA
-
-
-def _ahead(twist: Twist, rates: Twist, dt: float) -> Twist:
-    return (twist[0] + dt * rates[0], twist[1] + dt * rates[1], twist[2] + dt * rates[2])
-
-
-def explicit_euler(twist: Twist, feet: Sequence[Contact], dt: float) -> Twist:
-    """Return the twist after a step with the friction at the start of the step."""
-    return _ahead(twist, _friction_rates(twist, feet), dt)
-
-
-def runge_kutta(twist: Twist, feet: Sequence[Contact], dt: float) -> Twist:
-    """Return the twist after a step of the classic Runge-Kutta method of four stages."""
-    one = _friction_rates(twist, feet)
-    two = _friction_rates(_ahead(twist, one, 0.5 * dt), feet)
-    three = _friction_rates(_ahead(twist, two, 0.5 * dt), feet)
-    four = _friction_rates(_ahead(twist, three, dt), feet)
-    mean = [
-        (a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(one, two, three, four, strict=True)
+def tripod_feet(caps: Sequence[float], stiffness: float) -> list[Contact]:
+    """Return the feet of the tripod on level ground, with caps, N, and a stiffness, N/m."""
+    return [
+        Contact(stiffness, cap=cap, lever_x=x, lever_y=y)
+        for (x, y), cap in zip(TRIPOD, caps, strict=True)
     ]
-    return _ahead(twist, (mean[0], mean[1], mean[2]), dt)
 
 
-def explicit_friction() -> list[Outcome]:
-    """Turn a standing robot slightly; chatter is the mean speed of its feet 400 steps later."""
-    radius = max(math.hypot(*lever) for lever in TRIPOD)
-    peers = {'explicit Euler': explicit_euler, 'RK4': runge_kutta}
-    outcomes = []
-    for name in (*peers, *OURS):
-        for dt in STEPS:
-            feet = tripod_feet([FRICTION * WEIGHT / len(TRIPOD)] * len(TRIPOD))
-            twist: Twist = (0.0, 0.0, KICK / radius)
-            speeds = []
-            for count in range(_COUNT):
-                if name in peers:
-                    twist = peers[name](twist, feet, dt)
-                else:
-                    twist = OURS[name](twist, MASS, INERTIA, feet, dt, twist)
-                if count >= _COUNT - 20:
-                    speeds += [math.hypot(*foot.slip(twist)) for foot in feet]
-            value = sum(speeds) / len(speeds)
-            law = None
-            if name == 'explicit Euler':
-                # Chatter from +s to -s and back has s/v = √((dt/limit)² - 1).
-                over = dt / step_limits()['turning']
-                law = SOFTENING * math.sqrt(over * over - 1.0) if over > 1.0 else 0.0
-            outcomes.append(EXPLICIT.of(name, dt, value, law, value > KICK))
-    return outcomes
+# --- a: creep in MuJoCo --------------------------------------------------------------------------
 
-
-# --- b: creep in MuJoCo --------------------------------------------------------------------------
-
-CREEP = Case('creep in MuJoCo', 'step, s', 'creep, m/s')
-NEEDS_MUJOCO = 'not measured, pip install "ros_pad[mujoco]"'
 PUSH = 0.8  # force over the friction limit
 CREEP_STEPS = (1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)
 CREEP_LIMIT = 1e-4  # m/s
@@ -344,150 +187,53 @@ def mujoco_creep(dt: float, cone: str, ratio: float, noslip: int) -> float:
     )
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, round(0.5 / dt))
+    steps = round(0.5 / dt)
+    mujoco.mj_step(model, data, steps)
     data.qfrc_applied[0] = PUSH * _TOUCH * WEIGHT
-    mujoco.mj_step(model, data, round(0.5 / dt))
+    mujoco.mj_step(model, data, steps)
     start = data.qpos[0]
-    mujoco.mj_step(model, data, round(0.5 / dt))
-    return float((data.qpos[0] - start) / (round(0.5 / dt) * dt))
+    mujoco.mj_step(model, data, steps)
+    return float((data.qpos[0] - start) / (steps * dt))
 
 
-def planar_creep(step: Step, dt: float) -> float:
-    """Return the creep of such a block with a step of ros_pad, m/s.
+def planar_creep(dt: float) -> float:
+    """Return the creep of such a block with the step of ros_pad, m/s.
 
-    The push grows over 1 s, so that the pad hardly oscillates.
+    The push grows over 1 s, so that the pad hardly oscillates; the creep is the slope of the line
+    through the path after it.
     """
-    foot = Contact(STIFFNESS)
-    foot.cap = _TOUCH * WEIGHT
-    twist, x, path = STILL, 0.0, [0.0]
+    foot = Contact(STIFFNESS, cap=_TOUCH * WEIGHT)
+    twist, x, path = (0.0, 0.0, 0.0), 0.0, [0.0]
     for count in range(1, round(3.0 / dt) + 1):
-        grown = 0.5 - 0.5 * math.cos(math.pi * min(1.0, count * dt))
-        push = grown * PUSH * foot.cap
+        push = (0.5 - 0.5 * math.cos(math.pi * min(1.0, count * dt))) * PUSH * foot.cap
         free = (twist[0] + push / MASS * dt, 0.0, 0.0)
-        twist = step(free, MASS, INERTIA, [foot], dt, twist)
+        twist = elastic(free, MASS, INERTIA, [foot], dt, twist)
         x += twist[0] * dt
         path.append(x)
-    # A small oscillation remains; the creep is the slope of the line through the path.
     late = np.array(path[round(1.0 / dt) :])
     return float(np.polyfit(dt * np.arange(len(late)), late, 1)[0])
 
 
 def creep() -> list[Outcome]:
-    """Push a block with 0.8 of its friction limit, in MuJoCo and with the steps of ros_pad."""
+    """Push a block with 0.8 of its friction limit, in MuJoCo and with the step of ros_pad."""
     outcomes = []
-    for name in (*SETTINGS, *OURS):
-        law = None
-        if name in SETTINGS:
-            cone, ratio, noslip = SETTINGS[name]
-            if cone == 'elliptic' and not noslip:
-                law = creep_law(ratio)
+    for name in (*SETTINGS, 'elastic'):
+        cone, ratio, noslip = SETTINGS.get(name, ('', 0, 0))
+        law = creep_law(ratio) if cone == 'elliptic' and not noslip else None
         for dt in CREEP_STEPS:
-            value = abs(
-                planar_creep(OURS[name], dt) if name in OURS else mujoco_creep(dt, *SETTINGS[name])
-            )
-            outcomes.append(CREEP.of(name, dt, value, law, value > CREEP_LIMIT))
+            value = abs(mujoco_creep(dt, cone, ratio, noslip) if cone else planar_creep(dt))
+            fails = value > CREEP_LIMIT
+            outcomes.append(
+                Outcome('creep in MuJoCo', name, not cone, 'step, s', dt, 'creep, m/s', value, law,
+                        fails)
+            )  # fmt: skip
     return outcomes
 
 
-# --- c: three sticking feet ----------------------------------------------------------------------
+# --- b: all feet slip ----------------------------------------------------------------------------
 
-SPLIT = Case('three sticking feet', 'leg', 'force of a foot along the push, N')
-SPLIT_PUSH = 0.3  # N, forward at the centre of mass: a twentieth of the caps
-SPLIT_CAPS = (1.0, 2.0, 3.0)  # N
-SPLIT_STIFFNESS = (3000.0, 2000.0, 1000.0)  # N/m
-GAUSS_SEIDEL = 'Gauss-Seidel'
-
-
-def balance(levers: Sequence[tuple[float, float]]) -> Array:
-    """Return the (3, 2n) matrix that maps the feet's forces to their sum and moment."""
-    return np.hstack([[[1.0, 0.0], [0.0, 1.0], [-y, x]] for x, y in levers])
-
-
-def gauss_seidel(
-    free: Twist,
-    mass: float,
-    inertia: float,
-    contacts: Sequence[Contact],
-    dt: float,
-    sweeps: int = 10000,
-) -> Twist:
-    """Step with rigid feet: stop one after another, impulses up to c dt, until none changes."""
-    vx, vy, omega = free
-    impulses = [(0.0, 0.0)] * len(contacts)
-    for _ in range(sweeps):
-        change = 0.0
-        for index, foot in enumerate(contacts):
-            rx, ry = foot.lever_x, foot.lever_y
-            xx, yy, xy = 1 / mass + ry * ry / inertia, 1 / mass + rx * rx / inertia, -rx * ry
-            xy /= inertia
-            sx, sy = foot.slip((vx, vy, omega))
-            determinant = xx * yy - xy * xy
-            px = impulses[index][0] - (yy * sx - xy * sy) / determinant
-            py = impulses[index][1] - (xx * sy - xy * sx) / determinant
-            size, limit = math.hypot(px, py), foot.cap * dt
-            if size > limit:
-                px, py = px * limit / size, py * limit / size
-            dx, dy = px - impulses[index][0], py - impulses[index][1]
-            impulses[index] = (px, py)
-            vx += dx / mass
-            vy += dy / mass
-            omega += (rx * dy - ry * dx) / inertia
-            change = max(change, abs(dx), abs(dy))
-        if change < 1e-14:
-            break
-    for foot, (px, py) in zip(contacts, impulses, strict=True):
-        foot.force_x, foot.force_y = px / dt, py / dt
-    return vx, vy, omega
-
-
-def split_law(method: str) -> Array:
-    """Return the (3, 2) forces with the least Σ|f|²/w, N; w is stiffness, cap, or 1."""
-    weights = {'elastic': SPLIT_STIFFNESS, 'creeping': SPLIT_CAPS}.get(method, (1.0, 1.0, 1.0))
-    spread = np.repeat(weights, 2)
-    matrix = balance(TRIPOD)
-    forces = spread * (
-        matrix.T @ np.linalg.solve(matrix * spread @ matrix.T, (-SPLIT_PUSH, 0.0, 0.0))
-    )
-    return np.asarray(forces).reshape(3, 2)
-
-
-def held(name: str, order: Sequence[int], dt: float = 0.02) -> tuple[Twist, Array]:
-    """Return twist and (3, 2) forces of the feet after the push has been held for 4 s."""
-    feet = tripod_feet(SPLIT_CAPS, SPLIT_STIFFNESS)
-    sorted_feet = [feet[index] for index in order]
-    twist = STILL
-    for _ in range(200):
-        free = (twist[0] + SPLIT_PUSH / MASS * dt, twist[1], twist[2])
-        if name == GAUSS_SEIDEL:
-            twist = gauss_seidel(free, MASS, INERTIA, sorted_feet, dt)
-        else:
-            twist = OURS[name](free, MASS, INERTIA, sorted_feet, dt, twist)
-    return twist, np.array([(foot.force_x, foot.force_y) for foot in feet])
-
-
-def sticking_feet() -> list[Outcome]:
-    """Push a standing robot; each method gets the three feet in all six orders."""
-    outcomes = []
-    for name in (GAUSS_SEIDEL, *OURS):
-        forces = {order: held(name, order)[1] for order in itertools.permutations(range(3))}
-        mean = np.mean(list(forces.values()), axis=0)
-        laws = -split_law(name)[:, 0] if name in OURS else (None, None, None)
-        for force in forces.values():
-            fails = bool(np.abs(force - mean).max() > 0.01 * SPLIT_PUSH)
-            outcomes += [
-                SPLIT.of(name, leg, float(-along), law, fails)
-                for leg, along, law in zip(LEGS, force[:, 0], laws, strict=True)
-            ]
-    return outcomes
-
-
-# --- d: all feet slip ----------------------------------------------------------------------------
-
-SLIPPING = Case('all feet slip', 'contraction of the fixed point', 'error of the twist, m/s')
-SLIPS = 100  # random steps
 SETTLED = 1e-6  # m/s
 MOST_ITERATIONS = 100
-_CREEP = 1e-6  # m/s: creep speed ε of the friction in Newton's method
 
 
 @dataclass(frozen=True)
@@ -527,7 +273,7 @@ def slides(count: int, seed: int = 0) -> list[Slide]:
     while len(found) < count:
         dt, speed = 10.0 ** rng.uniform(-3.5, -1.5), 10.0 ** rng.uniform(-2.0, -0.5)
         caps = [rng.uniform(0.1, 0.8) * WEIGHT / 3.0 for _ in TRIPOD]
-        feet = tripod_feet(caps, [1e5 / dt] * 3)
+        feet = tripod_feet(caps, 1e5 / dt)
         for foot in feet:
             foot.motion_x, foot.motion_y = speed * rng.uniform(-1, 1), speed * rng.uniform(-1, 1)
         free = (speed * rng.uniform(-1, 1), speed * rng.uniform(-1, 1), rng.uniform(-1.0, 1.0))
@@ -547,44 +293,37 @@ def contraction(twist: Twist, feet: Sequence[Contact], dt: float) -> float:
     """
     turned = np.zeros((3, 3))
     for foot in feet:
-        slip = np.array(foot.slip(twist))
+        slip, arm = np.array(foot.slip(twist)), foot.arm()[:2]
         size = float(np.hypot(*slip))
-        arm = np.array([[1.0, 0.0, -foot.lever_y], [0.0, 1.0, foot.lever_x]])
-        across = np.eye(2) - np.outer(slip, slip) / size**2
-        turned += arm.T @ (foot.cap / size * across) @ arm
-    return float(np.abs(np.linalg.eigvals(dt * turned / [[MASS], [MASS], [INERTIA]])).max())
+        turned += arm.T @ (foot.cap / size * (np.eye(2) - np.outer(slip, slip) / size**2)) @ arm
+    return float(np.abs(np.linalg.eigvals(np.linalg.solve(MASSES, dt * turned))).max())
 
 
 def fixed_point(slide: Slide) -> Twist:
     """Return the twist after 100 iterations, each with the forces at the last twist."""
-    twist = slide.start
+    twist = np.array(slide.start)
     for _ in range(MOST_ITERATIONS):
-        fx = fy = moment = 0.0
+        wrench = np.zeros(3)
         for foot in slide.feet:
-            sx, sy = foot.slip(twist)
-            gain = -foot.cap / max(math.hypot(sx, sy), 1e-12)
-            fx += gain * sx
-            fy += gain * sy
-            moment += gain * (foot.lever_x * sy - foot.lever_y * sx)
-        twist = _ahead(slide.free, (fx / MASS, fy / MASS, moment / INERTIA), slide.dt)
-    return twist
+            slip = np.array(foot.slip((twist[0], twist[1], twist[2])))
+            wrench -= foot.cap / max(math.hypot(*slip), 1e-12) * slip @ foot.arm()[:2]
+        twist = slide.free + slide.dt * np.linalg.solve(MASSES, wrench)
+    return float(twist[0]), float(twist[1]), float(twist[2])
 
 
-def full_newton(slide: Slide) -> Twist:
-    """Return the twist after up to 100 full Newton steps with friction c s/√(s² + ε²)."""
-    masses = np.diag([MASS, MASS, INERTIA])
+def full_newton(slide: Slide, creep: float = 1e-6) -> Twist:
+    """Return the twist after up to 100 full Newton steps with friction c s/√(s² + creep²)."""
     twist, free = np.array(slide.start), np.array(slide.free)
     for _ in range(MOST_ITERATIONS):
-        residual, slope = masses @ (twist - free), masses.copy()
+        residual, slope = MASSES @ (twist - free), MASSES.copy()
         for foot in slide.feet:
-            arm = np.array([[1.0, 0.0, -foot.lever_y], [0.0, 1.0, foot.lever_x]])
+            arm = foot.arm()[:2]
             slip = arm @ twist + (foot.motion_x, foot.motion_y)
-            size = math.sqrt(slip @ slip + _CREEP * _CREEP)
+            size = math.sqrt(slip @ slip + creep * creep)
             residual += slide.dt * foot.cap / size * arm.T @ slip
             bent = np.eye(2) - np.outer(slip, slip) / size**2
             slope += slide.dt * foot.cap / size * arm.T @ bent @ arm
-        step = np.linalg.solve(slope, residual)
-        twist = twist - step
+        twist = twist - np.linalg.solve(slope, residual)
         if not np.abs(twist).max() < 1e6:
             break
     return float(twist[0]), float(twist[1]), float(twist[2])
@@ -599,115 +338,25 @@ def miss(one: Twist, other: Twist) -> float:
 def slipping_feet() -> list[Outcome]:
     """Solve random steps from a bad start; the truth is rigid friction to 1e-8 m/s."""
     outcomes = []
-    for slide in slides(SLIPS):
-        for name in ('fixed point', 'Newton, full steps', 'elastic', 'creeping'):
-            if name in OURS:
-                for foot in slide.feet:
-                    foot.shear_x = foot.shear_y = 0.0
-                step = elastic if name == 'elastic' else partial(creeping, creep=_CREEP)
-                twist = step(slide.free, MASS, INERTIA, slide.feet, slide.dt, slide.start)
-            else:
-                twist = fixed_point(slide) if name == 'fixed point' else full_newton(slide)
+    for slide in slides(100):
+        twists = {
+            'fixed point': fixed_point(slide),
+            'Newton, full steps': full_newton(slide),
+            'elastic': elastic(slide.free, MASS, INERTIA, slide.feet, slide.dt, slide.start),
+        }
+        for name, twist in twists.items():
             value = miss(twist, slide.truth)
-            known = value if value < math.inf else None
-            outcomes.append(SLIPPING.of(name, slide.contraction, known, None, not value < SETTLED))
+            outcomes.append(
+                Outcome('all feet slip', name, name == 'elastic',
+                        'contraction of the fixed point', slide.contraction,
+                        'error of the twist, m/s', value if value < math.inf else None, None,
+                        not value < SETTLED)
+            )  # fmt: skip
     return outcomes
 
 
-# --- e: a foot would have to pull ----------------------------------------------------------------
+# --- c: a hose near equal pressures --------------------------------------------------------------
 
-PULLING = Case(
-    'a foot would have to pull',
-    'pressure point beyond the edge, m',
-    'weight, or moment over its arm, that is made up, shares of the weight',
-)
-FALLING = Case('top-heavy walk', 'height of the centre of mass, m', 'time of the verdict, s')
-VERDICT = 'verdict of PlanarRobot'
-OFFSETS = tuple(float(x) for x in np.linspace(-0.06, 0.06, 25))  # m beyond the edge
-HEIGHTS = (0.12, 0.6, 0.85, 0.9, 0.95, 1.0)  # height of the centre of mass, m
-
-
-def least_norm(feet: Sequence[tuple[float, float]], x: float, y: float) -> Array:
-    """Return the loads with the least Σ N² that carry a weight of 1 at a point."""
-    places = np.array(feet)
-    matrix = np.vstack([np.ones(len(places)), places.T])
-    return np.asarray(np.linalg.pinv(matrix) @ (1.0, x, y))
-
-
-def pulling_feet() -> list[Outcome]:
-    """Move the pressure point forward across the edge of a tripod, and walk a top-heavy robot."""
-    # Feet 1 and 5 make the front edge; foot 3 is the one that would have to pull.
-    front, side = np.array(TRIPOD[0]), np.array(TRIPOD[2])
-    along = (side - front) / np.linalg.norm(side - front)
-    out = np.array([-along[1], along[0]])
-    out *= np.sign(out[0])
-    middle = 0.5 * (front + side)
-    depth = float((middle - np.array(TRIPOD[1])) @ out)
-    outcomes = []
-    for beyond in OFFSETS:
-        loads = least_norm(TRIPOD, *(middle + beyond * out))
-        clamped = np.maximum(loads, 0.0)
-        scaled = clamped / clamped.sum()
-        left = float((middle + beyond * out - scaled @ np.array(TRIPOD)) @ out)
-        # The foot that would pull with this share of the weight is left out by the plain methods.
-        law = max(beyond, 0.0) / depth
-        for name, value in (
-            ('clamped', float(clamped.sum()) - 1.0),
-            ('clamped, scaled to the weight', left / depth),
-        ):
-            outcomes.append(PULLING.of(name, beyond, value, law, abs(value) > 1e-9))
-    for height in HEIGHTS:
-        expected, fell = tip_over_law(height), walk_top_heavy(height)[0]
-        fails = (fell is None) != (expected is None)
-        outcomes.append(FALLING.of(VERDICT, height, fell, expected, fails))
-    return outcomes
-
-
-def walk_top_heavy(height: float) -> tuple[float | None, str | None]:
-    """Walk a gait cycle on dry ground with the centre of mass at a height, m.
-
-    Return time, s, and text of the verdict; None and None without a verdict. The pads are stiff,
-    because on soft ones the body lags behind the gait and falls 10 ms later.
-    """
-    body = dataclasses.replace(BODY, height=height)
-    foot = dataclasses.replace(_SCENE.foot, shear_stiffness=1e6)
-    scene = dataclasses.replace(_SCENE, body=body, foot=foot, tow=Tow(), settle=0.0)
-    robot = PlanarRobot(scene, scene.floor.build(0), 1e-3)
-    while robot.time < scene.gait.cycle:
-        robot.step([0.0] * len(robot.legs))
-        if robot.verdict:
-            return robot.time, robot.verdict
-    return None, None
-
-
-def tip_over_law(height: float) -> float | None:
-    """Return when the pressure point leaves the feet in a walk without slip, s; None if never.
-
-    The point is behind the centre of mass by height times acceleration over gravity. Only times at
-    which just one tripod stands are used.
-    """
-    gait = _SCENE.gait
-    assert isinstance(gait, WalkingGait)
-    for count in range(1, 1001):
-        time = count * gait.cycle / 1000
-        standing = [leg for leg in range(6) if gait.phase(leg, time) < gait.duty]
-        if len(standing) > 3:
-            continue
-        places = []
-        for leg in standing:
-            since = gait.phase(leg, time) * gait.cycle
-            moved = gait.body_advance(time) - gait.body_advance(time - since)
-            x, y = BODY.homes[leg]
-            places.append((x + gait.reach() - moved, y))
-        speed = gait.peak_acceleration * math.sin(4.0 * math.pi * time / gait.cycle)
-        if least_norm(places, -height * speed / GRAVITY, 0.0).min() < 0.0:
-            return time
-    return None
-
-
-# --- f: a hose near equal pressures --------------------------------------------------------------
-
-HOSE = Case('pad filled through a hose', 'step, s', 'pressure off the set-point, Pa')
 FILL = 75e3  # Pa
 FILL_STEPS = tuple(float(dt) for dt in np.geomspace(1e-5, 0.02, 12))
 _LINE = Hose(4e-3, 1.0)
@@ -715,14 +364,13 @@ _VOLUME = _SCENE.foot.air_volume(0.0)
 _FILL_TIME = 0.5  # s: the pad is full long before
 _QUIET = 1.0  # Pa: larger distances from the set-point count as failures
 ISO, ISO_LINEAR = 'explicit Euler, ISO 6358', 'explicit Euler, ISO 6358 with linear range'
-CHANNEL = 'PneumaticChannel'
-FULL = Case('pad kept full, with error control', 'time simulated, s', 'calls of the flow')
+CHANNEL, KEPT = 'PneumaticChannel', 'pad kept full, with error control'
 SOLVERS = ('RK45', 'LSODA', 'Radau', 'BDF')
 TIMES = (0.1, 0.2, 0.3)  # s
-MANY = 1000  # calls
-MOST_CALLS = 120_000
+MANY, MOST_CALLS = 1000, 120_000
 _REGULATOR = RegulatorModel(natural_frequency=1000.0, damping=1.0, dead_time=0.0, dead_band=0.0)
 _CAPACITY = REFERENCE_DENSITY * (_VOLUME + _LINE.volume) / REFERENCE_PRESSURE  # kg/Pa
+_SUPPLY = FILL + ATMOSPHERE
 
 
 def iso_flow(first: float, second: float) -> float:
@@ -743,51 +391,29 @@ def linear_flow(first: float, second: float) -> float:
     return conductance(sonic, critical, first, second) * (first - second)
 
 
-def _flow_slope() -> float:
-    """Return A of dp/dt = A √|Δp| near equal pressures, √Pa/s."""
-    up = FILL + ATMOSPHERE
-    return (
-        _LINE.sonic_conductance * REFERENCE_DENSITY * up / _CAPACITY
-        * math.sqrt(2.0 / ((1.0 - _LINE.critical_ratio) * up))
-    )  # fmt: skip
-
-
-def linear_limit() -> float:
-    """Return the longest stable step of explicit Euler with ISO's linear range, s: 2/rate."""
-    supply = FILL + ATMOSPHERE
-    rate = conductance(_LINE.sonic_conductance, _LINE.critical_ratio, supply, supply) / _CAPACITY
-    return 2.0 / rate
-
-
 def fill_law(dt: float) -> float:
     """Return the chatter of explicit Euler without linear range, Pa: (A dt/2)², never zero.
 
     Where dp/dt = A √|Δp|, a step takes Δp to -Δp when A dt √Δp = 2 Δp.
     """
-    return (0.5 * _flow_slope() * dt) ** 2
+    bend = math.sqrt(2.0 / ((1.0 - _LINE.critical_ratio) * _SUPPLY))
+    slope = _LINE.sonic_conductance * REFERENCE_DENSITY * _SUPPLY / _CAPACITY * bend
+    return (0.5 * slope * dt) ** 2
 
 
 def filled(flow: Callable[[float, float], float], dt: float) -> float:
     """Return the largest distance from the supply's pressure in the last steps, Pa."""
-    supply = FILL + ATMOSPHERE
-    pressure, count = ATMOSPHERE, round(_FILL_TIME / dt)
-    worst = 0.0
-    for step in range(count):
-        pressure = max(1.0, pressure + dt * flow(supply, pressure) / _CAPACITY)
-        if step >= count - 10:
-            worst = max(worst, abs(pressure - supply))
-    return worst
+    pressure, path = ATMOSPHERE, []
+    for _ in range(round(_FILL_TIME / dt)):
+        pressure = max(1.0, pressure + dt * flow(_SUPPLY, pressure) / _CAPACITY)
+        path.append(abs(pressure - _SUPPLY))
+    return max(path[-10:])
 
 
 def filled_by_channel(dt: float) -> float:
-    """Return the largest distance from the set-point in the last steps of our channel, Pa.
-
-    Its regulator has a negligible lag.
-    """
+    """Return the same of our channel, whose regulator has a negligible lag."""
     channel = PneumaticChannel(_REGULATOR, _LINE, _VOLUME)
-    count = round(_FILL_TIME / dt)
-    pressures = [channel.step(FILL, dt) for _ in range(count)]
-    return max(abs(pressure - FILL) for pressure in pressures[-10:])
+    return max([abs(channel.step(FILL, dt) - FILL) for _ in range(round(_FILL_TIME / dt))][-10:])
 
 
 class _CountingHose(Hose):
@@ -803,17 +429,12 @@ class _CountingHose(Hose):
 def channel_calls(duration: float) -> int:
     """Return how often our channel calls the conductance of its hose in a time, s."""
     _CountingHose.calls = 0
-    channel = PneumaticChannel(_REGULATOR, _CountingHose(4e-3, 1.0), _VOLUME)
-    channel.step(FILL, duration)
+    PneumaticChannel(_REGULATOR, _CountingHose(4e-3, 1.0), _VOLUME).step(FILL, duration)
     return _CountingHose.calls
 
 
 def adaptive_calls(method: str, duration: float) -> int | None:
-    """Return how often solve_ivp, to 1e-6, calls the flow in a time, s.
-
-    None for more than :data:`MOST_CALLS`, when it is stopped.
-    """
-    supply = FILL + ATMOSPHERE
+    """Return how often solve_ivp, to 1e-6, calls the flow; None when it is stopped as too many."""
     calls = 0
 
     def rates(_: float, pressure: Array) -> list[float]:
@@ -821,7 +442,7 @@ def adaptive_calls(method: str, duration: float) -> int | None:
         calls += 1
         if calls > MOST_CALLS:
             raise TimeoutError
-        return [iso_flow(supply, float(pressure[0])) / _CAPACITY]
+        return [iso_flow(_SUPPLY, float(pressure[0])) / _CAPACITY]
 
     with suppress(TimeoutError):
         solve_ivp(rates, (0.0, duration), [ATMOSPHERE], method, rtol=1e-6, atol=0.1)
@@ -841,26 +462,25 @@ def filling() -> list[Outcome]:
             value = method(dt)
             # The law holds for small differences of pressure.
             law = fill_law(dt) if name == ISO and fill_law(dt) < 0.1 * FILL else None
-            outcomes.append(HOSE.of(name, dt, value, law, value > _QUIET))
+            outcomes.append(
+                Outcome('pad filled through a hose', name, name == CHANNEL, 'step, s', dt,
+                        'pressure off the set-point, Pa', value, law, value > _QUIET)
+            )  # fmt: skip
     for name in (*SOLVERS, CHANNEL):
+        label = name if name == CHANNEL else f'solve_ivp ({name})'
         for time in TIMES:
             calls = channel_calls(time) if name == CHANNEL else adaptive_calls(name, time)
-            label = name if name == CHANNEL else f'solve_ivp ({name})'
-            outcomes.append(FULL.of(label, time, calls, None, calls is None or calls > MANY))
+            outcomes.append(
+                Outcome(KEPT, label, name == CHANNEL, 'time simulated, s', time,
+                        'calls of the flow', calls, None, calls is None or calls > MANY)
+            )  # fmt: skip
     return outcomes
 
 
-# --- g: the threshold of the rail leg ------------------------------------------------------------
+# --- d: the threshold of the rail leg ------------------------------------------------------------
 
-THRESHOLD = Case(
-    'threshold of the rail leg',
-    'cap over drag',
-    'change of the distance for one per cent of friction, %',
-)
-RAIL = 'RailLeg'
 RATIOS = (1.03, 1.06, 1.1, 1.17, 1.3, 1.47, 2.0, 3.0, 5.0)  # cap over drag
 RAIL_STEPS = (4e-3, 1e-3)
-_RAIL_CYCLES = 4
 ILL = 3.0  # change of the distance for one per cent of friction, %
 
 
@@ -874,7 +494,7 @@ def rail_distance(ratio: float, dt: float) -> float:
     )
     scene = dataclasses.replace(scene, body=body, foot=foot, settle=0.0)
     leg = RailLeg(scene, scene.floor.build(0), dt)
-    for _ in range(round(_RAIL_CYCLES * scene.gait.cycle / dt)):
+    for _ in range(round(4 * scene.gait.cycle / dt)):
         leg.step([0.0])
     return leg.body[0]
 
@@ -896,17 +516,59 @@ def threshold() -> list[Outcome]:
         for ratio in RATIOS:
             value = condition(ratio, dt)
             law = ratio / (ratio - 1.0) if ratio <= 1.5 else None
-            method = f'{RAIL}, step {1e3 * dt:g} ms'
-            outcomes.append(THRESHOLD.of(method, ratio, value, law, value > ILL))
+            outcomes.append(
+                Outcome('threshold of the rail leg', f'RailLeg, step {1e3 * dt:g} ms', True,
+                        'cap over drag', ratio,
+                        'change of the distance for one per cent of friction, %', value, law,
+                        value > ILL)
+            )  # fmt: skip
     return outcomes
 
 
-CASES: tuple[Callable[[], list[Outcome]], ...] = (
-    explicit_friction,
-    creep,
-    sticking_feet,
-    slipping_feet,
-    pulling_feet,
-    filling,
-    threshold,
-)
+# --- picture -------------------------------------------------------------------------------------
+
+_OTHERS = ((VERMILION, 'o'), (ORANGE, 's'), (PURPLE, 'D'), (BLUE, '^'), (PALE, 'v'))
+_LAW: dict[str, Any] = {'color': BLACK, 'lw': 0.9, 'zorder': 1.5}
+
+
+def figures(outcomes: list[Outcome], progress: Progress | None = None) -> dict[str, Figure]:
+    """Return the picture, by name: a panel for each case; green is ours, black the law."""
+    # Case, factors of input and value, least value drawn, and what the axes are called.
+    panels: tuple[tuple[str, float, float, float, dict[str, Any]], ...] = (
+        ('creep in MuJoCo', 1e3, 1e3, 1e-5,
+         {'xlabel': 'step, ms', 'ylabel': 'creep at 0.8 of the limit, mm/s'}),
+        ('all feet slip', 1.0, 1.0, 1e-11,
+         {'xlabel': 'growth of an error by the fixed point', 'ylabel': 'error of the twist, m/s',
+          'ylim': (1e-11, 3.0)}),
+        ('pad filled through a hose', 1e3, 1.0, 1e-3,
+         {'xlabel': 'step, ms', 'ylabel': 'chatter of the pressure, Pa'}),
+        ('threshold of the rail leg', 1.0, 1.0, 1e-3,
+         {'xlabel': 'cap over drag', 'ylabel': 'distance for 1 % of friction, %'}),
+    )  # fmt: skip
+    limits = {'creep in MuJoCo': 1e3 * CREEP_LIMIT, 'threshold of the rail leg': ILL}
+    with matplotlib.rc_context(PAPER_STYLE):
+        figure = Figure(figsize=(11.0, 7.5), layout='constrained')
+        for letter, panel, (name, across, up, floor, names) in zip(
+            'abcd', figure.subplots(2, 2).ravel(), panels, strict=True
+        ):
+            case = [outcome for outcome in outcomes if outcome.case == name]
+            _draw(panel, case, across, up, floor, lines='slip' not in name)
+            panel.set(xscale='log', yscale='log', title=f'{letter}  {name}', **names)
+            if name in limits:
+                panel.axhline(limits[name], color=PALE, lw=0.9, ls='--', zorder=1)
+            panel.legend(fontsize=7.5)
+    return {'stability': figure}
+
+
+def _draw(
+    panel: Axes, case: Sequence[Outcome], across: float, up: float, floor: float, lines: bool
+) -> None:
+    looks = iter(_OTHERS)
+    for name, part in _methods(case).items():
+        colour, marker = (GREEN, '.') if part[0].ours else next(looks)
+        x = [across * row.at for row in part]
+        y = [np.nan if row.value is None else max(up * row.value, floor) for row in part]
+        panel.plot(x, y, marker, color=colour, ms=4.0, ls='-' if lines else '', lw=0.9, label=name)
+        law = [(across * row.at, up * row.law) for row in part if row.law and up * row.law > floor]
+        if law:
+            panel.plot(*zip(*law, strict=True), **_LAW)

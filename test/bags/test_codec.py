@@ -62,12 +62,6 @@ def test_both_byte_orders_are_read():
     assert number.decode(b'\0\0\0\0' + struct.pack('>d', 0.1)).data == 0.1
 
 
-@pytest.mark.parametrize('data', [b'', b'\0\1\0\0', bytes(11), b'\0\3\0\0' + bytes(8)])
-def test_bytes_that_are_no_message_are_an_error(data):
-    with pytest.raises((ValueError, IndexError, struct.error)):
-        codec.message_type(*FLOAT).decode(data)
-
-
 @pytest.mark.parametrize(
     'definition',
     ['no/Such thing', 'string data\nint32[<=', 'string[99999999] names', 'float64 a\nfloat64 a'],

@@ -14,7 +14,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
@@ -159,13 +159,6 @@ def ros_class(name):
     return getattr(importlib.import_module(f'{package}.msg'), of_ros)
 
 
-def test_the_types_with_all_their_fields_and_topics_are_tested():
-    assert {len(LEAVES[name]) for name in FIXED} == {1, 2, 5, 6, 9, 10, 40, 45}
-    assert {LEAVES[POINT][0], *LEAVES[POINT][-3:]} == {STAMP[0], 'point.x', 'point.y', 'point.z'}
-    there = [topic for topic in TOPICS if topic.type_name not in WITH_LISTS]
-    assert sum(len(paths) - 1 for paths in PATHS.values()) == len(there)
-
-
 @every_type
 @given(data=st.data())
 @quick
@@ -184,15 +177,6 @@ def test_fields_are_read_in_both_byte_orders(name, data):
         check(name, content, encoded(name, content, order))
 
 
-@every_type
-@pytest.mark.parametrize('order', [LITTLE, BIG])
-def test_texts_of_all_lengths_are_read(name, order):
-    for letter in ('a', 'κ', '🦎'):
-        for length in range(41):
-            content = some(name, letter * length)
-            check(name, content, encoded(name, content, order))
-
-
 @given(data=st.data())
 @quick
 def test_fields_are_read_in_the_order_of_the_paths(data):
@@ -202,11 +186,6 @@ def test_fields_are_read_in_the_order_of_the_paths(data):
     reader = FieldReader(TYPES[name], paths)
     for order in (LITTLE, BIG):
         assert bits(reader(encoded(name, content, order))) == chosen(content, paths)
-
-
-def test_bytes_behind_a_message_are_not_read():
-    content = some(POINT)
-    check(POINT, content, encoded(POINT, content) + b'\xff' * 9)
 
 
 @every_type
@@ -222,52 +201,9 @@ def test_messages_are_written_as_rosbags_writes_them(name, data):
     check(name, content, written)
 
 
-def unread(message_type, data):
-    """Return the places of the bytes that mean nothing."""
-
-    def changes(place, mask):
-        other = bytearray(data)
-        other[place] ^= mask
-        try:
-            return message_type.encode(message_type.decode(bytes(other))) != data
-        except Exception:  # rosbags raises any
-            return True
-
-    return {n for n in range(len(data)) if not (changes(n, 0x01) or changes(n, 0x80))}
-
-
-def same_but_for_padding(message_type, ours, theirs):
-    """Compare bytes with those of rclpy, which leaves anything in padding, also at the end."""
-    ignored = unread(message_type, ours)
-    return all(n in ignored or ours[n] == theirs[n] for n in range(len(ours)))
-
-
-@every_type
-@given(data=st.data())
-@settings(max_examples=10, deadline=None)
-def test_messages_are_written_as_rclpy_writes_them(name, data):
-    serialization = pytest.importorskip('rclpy.serialization')
-    content = data.draw(CONTENTS[name])
-    constants = {path: content[path] for path in LEAVES[name] if path not in NUMBERS[name]}
-    write = FieldWriter(TYPES[name], NUMBERS[name], constants)
-    ours = write(*(content[path] for path in NUMBERS[name]))
-    theirs = serialization.serialize_message(put(ros_class(name)(), content))
-    assert same_but_for_padding(TYPES[name], ours, theirs)
-    read = serialization.deserialize_message(ours, ros_class(name))
-    values = [plain(field_of(read, path)) for path in LEAVES[name]]
-    assert bits(values) == chosen(content, LEAVES[name])
-
-
 def plain(value):
     """Return a number of Python in place of one of NumPy."""
     return value.item() if isinstance(value, np.generic) else value
-
-
-def test_few_bytes_are_taken_for_padding():
-    data = encoded(POINT, some(POINT, 'abc'))
-    assert unread(TYPES[POINT], data) == {2, 3}  # the options, which CDR does not use
-    data = encoded(POINT, some(POINT, 'abcd'))
-    assert unread(TYPES[POINT], data) == {2, 3, *range(21, 28)}
 
 
 lists = st.lists(floats, max_size=8)
@@ -280,42 +216,6 @@ joint_states = st.fixed_dictionaries(
 )
 empty_lists = {'name': ['a'], 'position': [], 'velocity': [1.0], 'effort': []}
 empty_lists |= {STAMP[0]: 1, STAMP[1]: 2, FRAME: ''}
-
-
-def joint_state(content):
-    """Return the bytes of a JointState, of which only stamp and positions may differ."""
-    count = len(content['position'])
-    write = FieldWriter(
-        of_type(JOINT_STATE),
-        [*(f'position[{place}]' for place in reversed(range(count))), *STAMP],
-        {path: content[path] for path in (FRAME, 'name', 'velocity', 'effort')}
-        | {'position': [0.0] * count},
-    )
-    return write(*reversed(content['position']), content[STAMP[0]], content[STAMP[1]])
-
-
-@given(content=joint_states)
-@example(content=empty_lists)
-@quick
-def test_lists_of_constant_length_are_written_as_rosbags_writes_them(content):
-    message_type = of_type(JOINT_STATE)
-    arrays = {path: np.array(content[path]) for path in ('position', 'velocity', 'effort')}
-    message = put(message_type.blank(), content | arrays)
-    assert joint_state(content) == message_type.encode(message)
-
-
-@given(content=joint_states)
-@example(content=empty_lists)
-@settings(max_examples=10, deadline=None)
-def test_lists_of_constant_length_are_written_as_rclpy_writes_them(content):
-    serialization = pytest.importorskip('rclpy.serialization')
-    message = put(ros_class(JOINT_STATE)(), content)
-    ours, theirs = joint_state(content), serialization.serialize_message(message)
-    assert same_but_for_padding(of_type(JOINT_STATE), ours, theirs)
-    read = serialization.deserialize_message(ours, ros_class(JOINT_STATE))
-    assert (read.header, read.name) == (message.header, content['name'])
-    for path in ('position', 'velocity', 'effort'):
-        assert bits(getattr(read, path)) == bits(content[path])
 
 
 def test_a_writer_refuses_what_the_type_has_not():
@@ -394,22 +294,6 @@ def test_a_text_that_is_not_utf_8_is_refused_where_it_is_read(text, order):
     assert FieldReader(TYPES[POINT], ['point.x'])(data) == (0.1,)
 
 
-@pytest.mark.parametrize(
-    ('data', 'text'),
-    [
-        (b'', ''),  # rclpy, too, reads these three
-        (b'\0', ''),
-        (b'abc', 'abc'),
-        (b'a\0b\0', 'a\0b'),  # rosbags reads these two so; for rclpy they end at the first zero
-        (b'ab\0\0', 'ab\0'),
-    ],
-)
-def test_texts_that_no_node_writes_are_read(data, text):
-    for order in '<>':
-        read = FieldReader(TYPES[POINT], [FRAME, 'point.y'])
-        assert read(with_text(data, order)) == (text, 0.2)
-
-
 @pytest.mark.parametrize('size', [2**32 - 1, 2**32 - 12, 2**31, 2**31 - 1, 2**16, 24, 9])
 def test_a_size_beyond_the_message_is_refused_and_not_remembered(size):
     reader = FieldReader(TYPES[POINT], ['point.x'])
@@ -420,16 +304,6 @@ def test_a_size_beyond_the_message_is_refused_and_not_remembered(size):
             reader(bytes(data))
         assert raised.type is BadMessage
     assert reader._plan is None
-
-
-def test_texts_of_many_sizes_are_read_one_after_another():
-    reader = FieldReader(TYPES[POINT], ['point.x', FRAME])
-    for size in range(100, 1100):
-        assert reader(with_text(b'a' * size)) == (0.1, 'a' * size)
-    usual = with_text(b'leg_1_sole\0')
-    reader(usual)
-    plan = reader._plan
-    assert reader(usual) == (0.1, 'leg_1_sole') and reader._plan is plan
 
 
 def damaged(name, chance):
@@ -462,30 +336,6 @@ def rosbags_reads(name, data):
     except Exception:  # rosbags raises any
         return None
     return [plain(field_of(message, path)) for path in NUMBERS[name]]
-
-
-@every_type
-@given(
-    data=st.one_of(
-        st.binary(max_size=100),
-        st.builds(
-            bytes.__add__, st.sampled_from([bytes(4), b'\0\1\0\0']), st.binary(max_size=400)
-        ),
-        st.integers(0, 2**64).map(random.Random),
-    )
-)
-@settings(max_examples=100, deadline=None)
-def test_random_bytes_are_read_as_rosbags_reads_them_or_refused(name, data):
-    if isinstance(data, random.Random):
-        data = damaged(name, data)
-    for reader in READERS[name]:
-        result(reader, data)  # raises any other error
-    ours = result(FieldReader(TYPES[name], NUMBERS[name]), data)
-    theirs = rosbags_reads(name, data)
-    if theirs is not None:
-        # For rosbags, bytes that end within the text are enough.
-        assert isinstance(ours, tuple) or (name == STRING and ours is BadMessage)
-        assert not isinstance(ours, tuple) or bits(ours) == bits(theirs)
 
 
 RCLPY = """
@@ -588,45 +438,6 @@ def test_a_table_has_the_values_of_each_message(name, kinds):
             assert bits(row.tolist()) == bits(float(content[path]) for path in paths)
 
 
-@given(data=st.data())
-@quick
-def test_a_table_equals_the_calls_row_by_row(data):
-    name = data.draw(st.sampled_from(FIXED))
-    paths = data.draw(st.permutations(NUMBERS[name]))
-    contents = data.draw(st.lists(CONTENTS[name], max_size=4))
-    reader = FieldReader(TYPES[name], paths)
-    messages = [encoded(name, content, data.draw(st.booleans())) for content in contents]
-    table = reader.table(messages)
-    assert table.shape == (len(messages), len(paths))
-    for row, message in zip(table, messages, strict=True):
-        assert bits(row.tolist()) == bits(map(float, reader(message)))
-
-
-def test_a_table_reads_messages_with_more_bytes_behind_them():
-    data = encoded(POINT, some(POINT))
-    table = FieldReader(TYPES[POINT], ['point.z', 'point.x']).table([data, data + b'\xff' * 8])
-    assert table.tolist() == [[5.5, 3.5]] * 2
-    # Two messages of one size whose numbers are at other places.
-    short, long = encoded(POINT, some(POINT, 'a')) + bytes(8), encoded(POINT, some(POINT, 'a' * 9))
-    assert len(short) == len(long)
-    table = FieldReader(TYPES[POINT], ['point.z', 'point.x']).table([short, long])
-    assert table.tolist() == [[5.5, 3.5]] * 2
-    read = FieldReader(TYPES[BOOL], ['data'])
-    assert read.table([b'\0\1\0\0\2']).tolist() == [[1.0]] == [list(read(b'\0\1\0\0\2'))]
-
-
-@every_type
-def test_a_table_of_no_messages_has_no_rows(name):
-    assert FieldReader(TYPES[name], NUMBERS[name]).table([]).shape == (0, len(NUMBERS[name]))
-
-
-@pytest.mark.parametrize('texts', [[], ['12'], ['12', '12'], ['12', '345'], ['a', 'b']])
-def test_a_table_has_no_texts(texts):
-    messages = [encoded(POINT, some(POINT, text)) for text in texts]
-    with pytest.raises(ValueError, match=FRAME):
-        FieldReader(TYPES[POINT], ['point.x', FRAME]).table(messages)
-
-
 @pytest.mark.parametrize(
     ('paths', 'words'),
     [
@@ -640,29 +451,6 @@ def test_a_table_has_no_texts(texts):
 def test_a_path_that_is_unknown_or_given_twice_is_an_error(paths, words):
     with pytest.raises(ValueError, match=words):
         FieldReader(TYPES[POINT], paths)
-
-
-def test_fields_beside_lists_and_texts_are_read():
-    message_type = of_type('nav_msgs/msg/Odometry')
-    reader = FieldReader(message_type, [STAMP[0], 'child_frame_id', 'pose.pose.position.z'])
-    message = message_type.blank()
-    for frame, child in (('', ''), ('odom', 'base'), ('odometry', 'κ')):
-        message.header.frame_id, message.child_frame_id = frame, child
-        message.header.stamp.sec, message.pose.pose.position.z = 3, 0.25
-        assert reader(message_type.encode(message)) == (3, child, 0.25)
-    message_type = of_type(JOINT_STATE)
-    reader, message = FieldReader(message_type, STAMP), message_type.blank()
-    for names in ([], ['knee'], ['hip', 'a long name']):
-        message.name, message.position = names, np.arange(float(len(names)))
-        message.header.stamp.nanosec = len(names)
-        data = message_type.encode(message)
-        assert reader(data) == (0, len(names))
-        for size in range(len(data)):
-            with pytest.raises(BadMessage):
-                FieldReader(message_type, STAMP)(data[:size])
-        assert reader.table([data, data]).tolist() == [[0.0, len(names)]] * 2
-    with pytest.raises(ValueError, match='position'):
-        FieldReader(message_type, ['position[0]'])
 
 
 def test_numbers_of_every_kind_are_at_multiples_of_their_size():

@@ -56,43 +56,39 @@ def chunks(path: pathlib.Path):
 
 
 def test_a_recorder_that_is_killed_loses_at_most_a_second(tmp_path):
+    """Its clock goes on by a millisecond with each message, whatever the machine does."""
     folder = tmp_path / 'trial'
     program = f"""
-        import time
+        import itertools, types
         from rclpy.serialization import serialize_message
         from std_msgs.msg import Float64
-        from ros_pad.bags import BagWriter
-        writer = BagWriter({str(folder)!r}, {{'seed': '3'}})
-        writer.add_topic('/wall', 'std_msgs/msg/Float64')
-        while True:
-            now = time.time_ns()
-            writer.write('/wall', serialize_message(Float64(data=float(now))), now)
+        from ros_pad.bags import BagWriter, writer
+        now = 0
+        writer.time = types.SimpleNamespace(monotonic=lambda: now * 1e-3)
+        bag = BagWriter({str(folder)!r}, {{'seed': '3'}})
+        bag.add_topic('/count', 'std_msgs/msg/Float64')
+        for now in itertools.count(1):
+            bag.write('/count', serialize_message(Float64(data=float(now))), now)
             print(now, flush=True)
-            time.sleep(0.001)
     """
     process = subprocess.Popen(
         [sys.executable, '-c', textwrap.dedent(program)], stdout=subprocess.PIPE, text=True
     )
     assert process.stdout
-    first = int(process.stdout.readline())
-    last = first
-    while last < first + 2_600_000_000:
-        last = int(process.stdout.readline())
+    while int(process.stdout.readline()) < 2_600:
+        pass
     process.send_signal(signal.SIGKILL)
-    said = [int(line) for line in process.stdout.read().split('\n')[:-1] if line]
+    last = [2_600, *map(int, process.stdout.read().split('\n')[:-1])][-1]
     process.wait()
-    last = said[-1] if said else last
     found = recovery.repair(folder, tmp_path / 'whole')
     assert not found.closed
     reader = BagReader(tmp_path / 'whole')
     assert reader.problem is None
     assert reader.custom_data['seed'] == '3'
     assert json.loads(reader.custom_data[recovery.KEY])['messages'] == found.messages
-    values = data_in(tmp_path / 'whole', '/wall')
-    assert len(values) == found.messages
-    assert values[0] == float(first)
-    # The bag is flushed once a second; a busy machine may be half a second late.
-    assert (last - values[-1]) * 1e-9 < 1.5
+    values = data_in(tmp_path / 'whole', '/count')
+    assert values == [float(number) for number in range(1, found.messages + 1)]
+    assert last - values[-1] <= 1_000
     # rosbags, an independent reader, opens the repaired bag.
     with rosbags.highlevel.AnyReader([tmp_path / 'whole']) as other:
         assert other.message_count == found.messages
@@ -136,22 +132,6 @@ def test_a_full_disk_is_reported_at_the_next_flush(tmp_path, monkeypatch):
             writer.write('/number', serialize_message(Float64()), number)
             writer.flush()
             time.sleep(0.001)
-
-
-def test_a_failed_write_is_reported_at_the_end(tmp_path, monkeypatch):
-    failed = []
-
-    def fsync(number):  # Linux reports a failed write only once
-        if not failed and '.mcap' in os.readlink(f'/proc/self/fd/{number}'):
-            failed.append(number)
-            raise OSError(5, 'Input/output error')
-
-    writer = BagWriter(tmp_path / 'trial')
-    writer.add_topic('/number', 'std_msgs/msg/Float64')
-    monkeypatch.setattr(os, 'fsync', fsync)
-    writer.write('/number', serialize_message(Float64()), 0)
-    with pytest.raises(BagError, match='Input/output error; 1 messages are saved'):
-        writer.close()
 
 
 @pytest.mark.parametrize('share', [0.3, 0.6, 0.99])
@@ -316,13 +296,6 @@ def test_metadata_that_is_wrong_is_repaired_too(trial, tmp_path, capsys):
         assert recovery.inspect(out).sound
 
 
-def test_a_bag_that_is_the_working_folder_is_repaired_beside_it(trial, monkeypatch, capsys):
-    (trial / 'metadata.yaml').unlink()
-    monkeypatch.chdir(trial)
-    assert main(['bag', 'repair', '.']) == 0
-    assert BagReader(f'{trial}_repaired').message_count == 10_000
-
-
 @pytest.mark.parametrize('key', ['ros_pad', 'ros_pad_lost', 'ros_pad_made_with'])
 def test_other_peoples_custom_data_are_no_crash(tmp_path, capsys, key):
     for place, said in enumerate(('no JSON', '7', '[1]')):
@@ -381,15 +354,3 @@ def test_the_command_lists_rates_and_gaps(tmp_path, capsys):
     assert said['topics']['/fast']['rate_hz'] == pytest.approx(225.0)
     assert said['topics']['/fast']['longest_gap_s'] == pytest.approx(0.044)
     assert said['topics']['/never']['rate_hz'] is None
-
-
-def test_the_command_lists_what_a_damaged_bag_says_of_itself(trial, capsys):
-    path = next(trial.glob('*.mcap'))
-    content = bytearray(path.read_bytes())
-    first = chunks(path)[0]
-    content[first.chunk_start_offset + 60 : first.chunk_start_offset + 90] = bytes(30)
-    path.write_bytes(content)
-    assert main(['bag', 'info', str(trial)]) == 1
-    captured = capsys.readouterr()
-    assert 'recorded at' not in captured.out and '10000 messages' in captured.out
-    assert 'is damaged at byte' in captured.err and 'pad bag repair' in captured.err

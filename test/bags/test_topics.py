@@ -61,15 +61,6 @@ def test_each_type_has_the_values_of_its_topic(topic):
     ]
 
 
-def test_nodes_have_the_classes_of_the_table():
-    of_nodes = pytest.importorskip('ros_pad.nodes.topics')
-    every = (*of_nodes.COMMON_TOPICS, of_nodes.FEET_MARKERS, *map(of_nodes.of_leg, OF_LEGS))
-    assert {topic.schema for topic in every} == set(TOPICS)
-    for topic in every:
-        package = topic.message.__module__.partition('.')[0]
-        assert f'{package}/msg/{topic.message.__name__}' == topic.type_name
-
-
 @pytest.mark.parametrize('topic', OF_LEGS, ids=lambda topic: topic.pattern)
 def test_topics_of_legs_have_numbers_of_a_record(topic):
     assert topic.record in {each.record for each in RECORDS}

@@ -3,24 +3,23 @@
 
 import json
 import math
-import pathlib
 
 import pytest
 
 from ros_pad import cli, configuration
 
 # A sole on which few of the drawn radii fit, so that a figure takes little time.
-SMALL = ['--radius', '5e-4', '--area', '2e-6']
+SMALL = ['--radius', '5e-4', '--sole-radius', '8e-4']
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+def said(capsys, *arguments):
     assert cli.main(['design', *arguments, '--json']) == 0
     printed = capsys.readouterr()
     assert printed.err == ''
     return json.loads(printed.out)
 
 
-def test_a_shipped_foot_as_built_and_full(capsys: pytest.CaptureFixture[str]):
+def test_a_shipped_foot_as_built_and_full(capsys):
     values = said(capsys, '--load', '7', '--foot', 'large37')
     built, full = values['designs']
     assert [each['name'] for each in values['designs']] == ['as built', 'full']
@@ -33,11 +32,11 @@ def test_a_shipped_foot_as_built_and_full(capsys: pytest.CaptureFixture[str]):
     assert not full['touching']
 
 
-def test_what_is_given_goes_before_the_foot(capsys: pytest.CaptureFixture[str]):
+def test_what_is_given_goes_before_the_foot(capsys):
     values = said(
         capsys,
         *('--load', '2', '--foot', 'large37', '--radius', '1e-3', '--stiffness', '30'),
-        *('--pressure', '70e3', '--margin', '1', '--criterion', 'max_depth'),
+        *('--pressure', '70e3', '--margin', '1', '--criterion', 'flattening'),
     )
     assert [each['name'] for each in values['designs']] == ['full']
     first = values['designs'][0]
@@ -46,7 +45,7 @@ def test_what_is_given_goes_before_the_foot(capsys: pytest.CaptureFixture[str]):
         'stiffness_n_per_m': 30.0,
         'ceiling_pa': 70e3,
         'margin': 1.0,
-        'criterion': 'max_depth',
+        'criterion': 'flattening',
         'area_m2': math.pi * 0.017**2,
     }
     assert {key: first[key] for key in expected} == expected
@@ -55,94 +54,56 @@ def test_what_is_given_goes_before_the_foot(capsys: pytest.CaptureFixture[str]):
 @pytest.mark.parametrize(
     ('arguments', 'parts'),
     [
-        (
-            ['25', '--criterion', 'measured'],
-            ['cannot be carried', '64 pads would be enough', 'closer pattern', '90000 Pa'],
-        ),
-        (
-            ['16', '--pressure', '80e3', '--criterion', 'measured'],
-            [
-                'cannot be carried',
-                'A supply of 82',
-                'would be enough',
-                'with the criterion thickn',
-            ],
-        ),
-        (
-            ['7', '--pressure', '50e3', '--criterion', 'measured'],
-            ['No number of pads', 'nothing below 52336 Pa'],
-        ),
         (['25'], ['cannot be carried', 'pads would be enough', '90000 Pa']),
-        (['50', '--radius', '2.4e-3'], ['the data for such pads end']),
+        (['25', '--criterion', 'measured'], ['64 pads would be enough']),
+        (['16', '--pressure', '80e3', '--criterion', 'measured'], ['A supply of 82']),
         (['7'], ['is carried: 51 pads']),
     ],
 )
-def test_words_say_what_would_carry(
-    arguments: list[str], parts: list[str], capsys: pytest.CaptureFixture[str]
-):
+def test_words_say_what_would_carry(arguments, parts, capsys):
     assert cli.main(['design', '--sole-radius', '0.017', '--load', *arguments]) == 0
     printed = capsys.readouterr().out
     for part in parts:
         assert part in printed
 
 
-def test_what_would_do_does(capsys: pytest.CaptureFixture[str]):
+def test_what_would_do_does(capsys):
     heavy = said(capsys, '--load', '25', '--sole-radius', '0.017')['designs'][0]
     assert not heavy['carried']
     area = heavy['pads_needed'] * 4.5 * math.sqrt(3) * 1.5e-3**2
-    assert said(capsys, '--load', '25', '--area', str(area))['designs'][0]['carried']
-
-
-def test_the_table_of_radii(capsys: pytest.CaptureFixture[str]):
-    assert cli.main(['design', '--load', '7', '--area', '9e-4']) == 0
-    lines = capsys.readouterr().out.splitlines()
-    row = next(line.split() for line in lines if line.startswith('pads'))
-    assert row == ['pads', '51']
-    radii = [line.split() for line in lines if line.strip().startswith('0.00')]
-    assert [float(each[0]) for each in radii] == sorted(float(each[0]) for each in radii)
-    assert {len(each) for each in radii} == {5}
-    assert float(radii[0][0]) == 0.0004  # the thickness of the sheet
+    radius = str(math.sqrt(area / math.pi) * (1.0 + 1e-9))
+    assert said(capsys, '--load', '25', '--sole-radius', radius)['designs'][0]['carried']
 
 
 @pytest.mark.parametrize(
     ('arguments', 'part'),
     [
         (['--load', '7'], '--sole-radius'),
-        (['--load', '0', '--area', '1e-3'], 'load = 0'),
-        (['--load', '7', '--area', '-1'], 'area = -1'),
-        (['--load', '7', '--sole-radius', '-1'], '--sole-radius = -1'),
-        (['--load', '7', '--area', '1e-6'], 'area = 1e-06 m²'),
-        (['--load', '7', '--area', '1e-3', '--radius', '0'], 'radius = 0'),
-        (['--load', '7', '--area', '1e-3', '--pressure', '0'], 'ceiling = 0'),
+        (['--load', '0', '--sole-radius', '0.02'], 'load = 0'),
+        (['--load', '7', '--sole-radius', '1e-3'], 'radius 0.0015 m = 3.1415'),
         (['--load', '7', '--foot', 'huge'], 'large37'),
         (['--load', '7', *SMALL, '--figure', 'design.txt'], '.png'),
     ],
 )
-def test_bad_input(arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
+def test_bad_input(arguments, part, capsys):
     assert cli.main(['design', *arguments]) == 2
     printed = capsys.readouterr()
     assert printed.out == ''
     assert part in printed.err
 
 
-def test_figure(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+def test_figure(tmp_path, capsys):
     path = tmp_path / 'design.png'
     values = said(capsys, '--load', '7', '--foot', 'large19', '--figure', str(path))
     assert values['figure'] == str(path)
     assert path.read_bytes().startswith(b'\x89PNG')
     # At this pressure no pad carries a load, so that a logarithmic axis has nothing to show.
-    arguments = ['--load', '7', '--area', '1e-3', '--pressure', '5e4']
-    assert cli.main(['design', *arguments, '--figure', str(path)]) == 2  # not overwritten
-    assert 'exists already' in capsys.readouterr().err
+    arguments = ['--load', '7', '--sole-radius', '0.017', '--pressure', '5e4']
     assert said(capsys, *arguments, '--figure', str(tmp_path / 'other.png'))
-    missing = tmp_path / 'none' / 'design.svg'
-    assert cli.main(['design', '--load', '7', *SMALL, '--figure', str(missing)]) == 1
-    assert str(missing) in capsys.readouterr().err
+    assert cli.main(['design', *arguments, '--figure', str(path)]) == 2  # not overwritten
 
 
-def test_a_measured_limit_holds_for_its_radius(
-    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
-):
+def test_a_measured_limit_holds_for_its_radius(tmp_path, capsys):
     """A foot file that states the thesis' line itself gives the designs of the shipped foot."""
     shipped = configuration.locate('feet', 'large37').read_text()
     own = tmp_path / 'own.yaml'
@@ -160,14 +121,14 @@ def test_a_measured_limit_holds_for_its_radius(
         assert {each['criterion'] for each in mine['radii']} == {'thickness'}
 
 
-def of_materials(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+def of_materials(capsys, *arguments):
     """Return what is printed; a slow machine shows a progress bar."""
     assert cli.main(['design', *arguments, '--json']) == 0
     return json.loads(capsys.readouterr().out)
 
 
 class TestMaterials:
-    def test_materials_and_thicknesses(self, capsys: pytest.CaptureFixture[str]):
+    def test_materials_and_thicknesses(self, capsys):
         values = of_materials(
             capsys,
             *('--load', '2', '--sole-radius', '0.017', '--pressure', '60e3'),
@@ -192,20 +153,18 @@ class TestMaterials:
         assert (values['criterion'], values['ceiling']) == ('flattening', 60e3)
         assert '3 of 4 candidates carry 2 N at up to 60000 Pa' in values['says'][0]
 
-    def test_the_table_and_the_picture(
-        self, tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
-    ):
+    def test_the_table_and_the_picture(self, tmp_path, capsys):
         path = tmp_path / 'materials.png'
-        arguments = ['--load', '7', '--area', '9e-4', '--height', '1e-3', '--figure', str(path)]
+        arguments = ['--load', '7', '--sole-radius', '0.017', '--figure', str(path)]
         assert cli.main(['design', *arguments, '--material', 'all']) == 0
         lines = capsys.readouterr().out.splitlines()
         rows = [line for line in lines if line.startswith(('dragon', 'ecoflex'))]
         assert len(rows) == 3 * len(configuration.names('materials'))
         assert all(line.endswith(('yes', 'in doubt', 'no')) for line in rows)
-        assert '7 N, 0.001 m high, at up to' in lines[-3]
+        assert '7 N at up to' in lines[-3]
         assert path.read_bytes().startswith(b'\x89PNG')
 
-    def test_a_foot_of_a_material(self, capsys: pytest.CaptureFixture[str]):
+    def test_a_foot_of_a_material(self, capsys):
         values = of_materials(capsys, '--load', '1', '--foot', 'small217')
         (found,) = values['candidates']
         assert (found['material'], found['pads']) == ('ecoflex_00_20', 217)
@@ -218,9 +177,7 @@ class TestMaterials:
         assert other['candidates'][0]['radius_m'] == 0.5e-3
         assert other['ceiling'] == 90e3
 
-    def test_the_line_of_a_foot_is_its_criterion(
-        self, tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
-    ):
+    def test_the_line_of_a_foot_is_its_criterion(self, tmp_path, capsys):
         shipped = configuration.locate('feet', 'small217').read_text()
         line = 'measured_limit: {force: 0.005, pressure: 1.0e+4, slope: 1.0e-6}'
         own = tmp_path / 'own.yaml'
@@ -241,13 +198,11 @@ class TestMaterials:
             (['--material', 'clay'], "no material named 'clay'"),
             (['--material', 'all', '--stiffness', '40'], '--stiffness is not allowed with'),
             (['--thickness', '4e-4'], '--thickness needs --material'),
-            (['--height', '1e-3'], '--height needs --material'),
             (['--material', 'all', '--thickness', '2e-3'], 'thickness = 0.002 is not allowed'),
-            (['--material', 'all', '--criterion', 'max_depth'], "criterion = 'max_depth'"),
         ],
     )
-    def test_bad_input(self, arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
-        assert cli.main(['design', '--load', '7', '--area', '1e-3', *arguments]) == 2
+    def test_bad_input(self, arguments, part, capsys):
+        assert cli.main(['design', '--load', '7', '--sole-radius', '0.018', *arguments]) == 2
         printed = capsys.readouterr()
         assert printed.out == ''
         assert part in printed.err

@@ -11,7 +11,6 @@ import re
 import shutil
 import subprocess
 import sys
-import webbrowser
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -20,7 +19,6 @@ import pytest
 from ros_pad import cli, configuration
 from ros_pad.commands import doctor
 from ros_pad.commands.doctor import Finding
-from ros_pad.simulation.fidelity import Promises
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
@@ -40,7 +38,7 @@ def one(findings: Any) -> Finding:
 
 @pytest.mark.parametrize(
     ('version', 'status'),
-    [((3, 10, 4), 'problem'), ((3, 11, 0), 'ok'), ((3, 13, 9), 'ok'), ((3, 14, 0), 'warning')],
+    [((3, 10, 4), 'problem'), ((3, 11, 0), 'ok')],
 )
 def test_python(version: tuple[int, ...], status: str):
     assert one(doctor.python(version)).status == status
@@ -90,35 +88,11 @@ def test_a_missing_package_is_named_and_the_doctor_goes_on(missing: str, tmp_pat
     assert found['logs']['status'] == 'ok'  # the last check still runs
 
 
-def test_broken_and_missing_packages_are_named(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / 'broken_pad.py').write_text('raise OSError("libgfortran.so.5")')
-    (tmp_path / 'half_pad.py').write_text('import not_there_pad')
-    monkeypatch.syspath_prepend(str(tmp_path))
-    finding = one(doctor.packages(['json', 'nowhere_pad', 'half_pad', 'broken_pad']))
-    assert finding.status == 'problem'
-    for part in ('nowhere_pad', 'not_there_pad', 'broken_pad (OSError: libgfortran.so.5)'):
-        assert part in finding.found
-    assert 'json' not in finding.found
-
-
-def test_missing_extras_say_how_to_install_them(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
-    found = list(doctor.extras())
-    assert {each.status for each in found} == {'warning'}
-    pip = {each.what: each.advice for each in found}
-    for name, extra in (('mujoco', 'mujoco'), ('numba', 'fast'), ('pyarrow', 'sweep')):
-        assert pip[name] == f'pip install --editable "{ROOT}[{extra}]"'
-    assert doctor._install('fast', ROOT / 'ros_pad') == 'pip install "ros_pad[fast]"'
-
-
 def test_extras_that_cannot_be_imported_say_why(
     tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ):
     modules = {
         'broken_pad': 'raise OSError("libGL.so.1: cannot open")',
-        'half_pad': 'import not_there_pad',
         'crashing_pad': 'import os; os.abort()',
         'whole_pad': '',
     }
@@ -126,40 +100,13 @@ def test_extras_that_cannot_be_imported_say_why(
         (tmp_path / f'{name}.py').write_text(code)
         monkeypatch.setitem(doctor.EXTRAS, name, ('mesh', 'nothing'))
     monkeypatch.syspath_prepend(str(tmp_path))
-    broken, half, crashing, whole = doctor.extras(list(modules))
-    assert (broken.status, half.status, crashing.status) == ('warning',) * 3
+    monkeypatch.setitem(doctor.EXTRAS, 'absent_pad', ('mesh', 'nothing'))
+    broken, crashing, whole, absent = doctor.extras([*modules, 'absent_pad'])
+    assert (broken.status, crashing.status, absent.status) == ('warning',) * 3
     assert 'status 1: OSError: libGL.so.1: cannot open' in broken.found
-    assert "No module named 'not_there_pad'" in half.found
     assert 'ends with status -6' in crashing.found
-    assert 'pip install --force-reinstall half_pad' in half.advice
+    assert absent.found == 'not installed: nothing' and 'ros_pad[mesh]' in absent.advice
     assert (whole.status, whole.found) == ('ok', 'nothing')
-
-
-def test_an_extra_that_hangs_is_not_waited_for(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / 'slow_pad.py').write_text('import time; time.sleep(3600)')
-    monkeypatch.setitem(doctor.EXTRAS, 'slow_pad', ('mesh', 'nothing'))
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(doctor, 'STARTING', 0.5)
-    finding = one(doctor.extras(['slow_pad']))
-    assert finding.status == 'warning'
-    assert 'slow_pad' in finding.found and 'within 0.5 s' in finding.found
-
-
-def test_extras_are_imported_side_by_side(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
-    # Each import ends only after the other one has begun.
-    code = """
-import pathlib, time
-(pathlib.Path(__file__).parent / {own!r}).touch()
-while not (pathlib.Path(__file__).parent / {other!r}).exists():
-    time.sleep(0.005)
-"""
-    for own, other in (('left_pad', 'right_pad'), ('right_pad', 'left_pad')):
-        (tmp_path / f'{own}.py').write_text(code.format(own=own, other=other))
-        monkeypatch.setitem(doctor.EXTRAS, own, ('mesh', 'nothing'))
-    monkeypatch.syspath_prepend(str(tmp_path))
-    assert [each.status for each in doctor.extras(['left_pad', 'right_pad'])] == ['ok', 'ok']
 
 
 def test_the_extras_are_those_of_setup():
@@ -176,37 +123,6 @@ def test_config_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
     finding = one(doctor.config_folder())
     assert (finding.status, str(tmp_path) in finding.found) == ('problem', True)
     assert 'setup.bash' in finding.advice
-
-
-def test_shipped_files_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
-    """A file of each kind that is damaged is named, and so are the bounds of fidelity levels."""
-    assert one(doctor.shipped_files()).status == 'ok'
-    shutil.copytree(ROOT / 'config', tmp_path / 'config')
-    monkeypatch.setattr('ros_pad.configuration.__file__', str(tmp_path / 'a' / 'b.py'))
-    damaged = [next((tmp_path / 'config' / kind).glob('*.yaml')) for kind in doctor.KINDS]
-    for path in damaged:
-        path.write_text('{')
-    finding = one(doctor.shipped_files())
-    assert finding.status == 'problem' and 'pip install' in finding.advice
-    assert all(f'{path}, line' in finding.found for path in damaged)
-    Promises.load.cache_clear()
-    (tmp_path / 'config' / 'fidelity.yaml').unlink()
-    assert 'fidelity.yaml' in one(doctor.shipped_files()).found
-    Promises.load.cache_clear()
-
-
-def test_a_missing_browser_is_a_warning(monkeypatch: pytest.MonkeyPatch):
-    def none() -> None:
-        raise webbrowser.Error
-
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: name)
-    monkeypatch.setattr('webbrowser.get', lambda: SimpleNamespace(name='firefox'))
-    assert 'firefox' in one(doctor.browser()).found
-    monkeypatch.setattr('webbrowser.get', none)
-    finding = one(doctor.browser())
-    assert finding.status == 'warning' and 'pad explore --no-browser' in finding.advice
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
-    assert not list(doctor.browser())
 
 
 def test_without_ros_it_lists_what_still_works(
@@ -233,20 +149,6 @@ def test_wheels_that_cannot_be_loaded_are_a_problem(
     assert one(doctor.ros()).status == 'problem'
 
 
-def test_missing_messages_are_named(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / 'rclpy.py').write_text('def get_rmw_implementation_identifier(): return "rmw"')
-    for name in {module.partition('.')[0] for module in doctor.ROS_MODULES} - {'rclpy'}:
-        (tmp_path / name).mkdir()
-        for part in ('__init__', 'msg', 'srv'):
-            (tmp_path / name / f'{part}.py').touch()
-    shutil.rmtree(tmp_path / 'std_srvs')
-    (tmp_path / 'std_srvs.py').touch()
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    found = list(doctor.ros())
-    assert (found[-1].what, found[-1].status) == ('messages', 'problem')
-    assert 'std_srvs' in found[-1].found and 'std_msgs' not in found[-1].found
-
-
 PREFIX = {'AMENT_PREFIX_PATH': '/opt/ros/jazzy'}
 
 
@@ -256,9 +158,7 @@ PREFIX = {'AMENT_PREFIX_PATH': '/opt/ros/jazzy'}
         ('jazzy', {}, 'ok'),
         ('kilted', {}, 'warning'),
         ('jazzy', PREFIX, 'problem'),
-        ('jazzy', {'LD_LIBRARY_PATH': '/x:/opt/ros/jazzy/lib'}, 'problem'),
         (None, {'ROS_DISTRO': 'jazzy', **PREFIX}, 'ok'),
-        (None, {'ROS_DISTRO': 'jazzy'}, 'ok'),  # built from source outside /opt/ros
         (None, {'ROS_DISTRO': 'rolling'}, 'warning'),
     ],
 )
@@ -308,55 +208,7 @@ def test_processes_that_are_kept_apart_are_a_problem(alone: pytest.MonkeyPatch):
     alone.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
     finding = doctor.loopback(1.0)
     assert finding.status == 'problem' and 'within 1 s' in finding.found
-    assert finding.advice.startswith('ROS_AUTOMATIC_DISCOVERY_RANGE=OFF')
-
-
-def test_nodes_that_hang_are_not_waited_for(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / 'rclpy.py').write_text('import time; time.sleep(3600)')
-    monkeypatch.setattr(doctor, 'STARTING', 0.5)
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    monkeypatch.syspath_prepend(str(tmp_path))
-    imported = one(doctor.ros())
-    assert imported.status == 'problem' and 'within 0.5 s' in imported.found
-    started = doctor.loopback(0.5)
-    assert started.status == 'problem' and 'does not start' in started.found
-    assert 'shm clean' in started.advice
-
-
-@pytest.mark.parametrize('number', ['blue', '400'])
-def test_a_domain_that_is_none_is_a_problem(alone: pytest.MonkeyPatch, number: str):
-    alone.setenv('ROS_DOMAIN_ID', number)
-    finding = doctor.loopback(1.0)
-    assert finding.status == 'problem'
-    # The advice begins with the wrong number; a firewall cannot be the cause.
-    assert finding.advice.startswith(f'ROS_DOMAIN_ID={number}: a number from 0 to 101')
-    assert 'UDP' not in finding.advice
-
-
-@pytest.mark.parametrize(
-    ('name', 'value', 'hint'),
-    [
-        ('ROS_LOCALHOST_ONLY', '1', 'unset ROS_LOCALHOST_ONLY'),
-        ('ROS_DISCOVERY_SERVER', 'host:11811', 'unset ROS_DISCOVERY_SERVER'),
-        ('FASTRTPS_DEFAULT_PROFILES_FILE', 'x.xml', 'unset FASTRTPS_DEFAULT_PROFILES_FILE'),
-        ('ROS_DOMAIN_ID', '102', 'from 0 to 101'),
-        ('ROS_DOMAIN_ID', '2', 'UDP ports 7900 to 8149'),
-        ('ROS_AUTOMATIC_DISCOVERY_RANGE', '', 'no multicast'),
-        ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF', 'LOCALHOST'),
-    ],
-)
-def test_hints_come_from_the_settings(
-    name: str, value: str, hint: str, monkeypatch: pytest.MonkeyPatch
-):
-    for each in ('ROS_LOCALHOST_ONLY', 'ROS_DISCOVERY_SERVER', 'FASTRTPS_DEFAULT_PROFILES_FILE'):
-        monkeypatch.delenv(each, raising=False)
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    monkeypatch.setenv('ROS_DOMAIN_ID', '7')
-    assert hint not in doctor.discovery_advice()
-    monkeypatch.setenv(name, value)
-    assert hint in doctor.discovery_advice()
+    assert 'ROS_AUTOMATIC_DISCOVERY_RANGE' in finding.advice
 
 
 def test_serial_ports(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
@@ -364,9 +216,7 @@ def test_serial_ports(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
     port.touch()
     assert one(doctor.serial_ports([])).found == 'none is plugged in'
     assert one(doctor.serial_ports([str(port)])).status == 'ok'
-    assert 'does not exist' in one(doctor.serial_ports([str(tmp_path / 'ttyUSB1')])).found
     monkeypatch.setattr(os, 'access', lambda *_: False)
-    monkeypatch.setattr(pathlib.Path, 'group', lambda _: 'dialout')
     finding = one(doctor.serial_ports([str(port)]))
     assert finding.status == 'warning'
     assert finding.advice.startswith('sudo usermod -aG dialout $USER')

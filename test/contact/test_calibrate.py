@@ -151,20 +151,6 @@ class TestShapes:
         assert k.value == pytest.approx(55.0, rel=1e-9)
         assert k.high - k.low < 1e-6
 
-    def test_pressed_domes_alone_will_do_by_height_or_gap(self):
-        pad = dataclasses.replace(FOOT.pad, stiffness=47.0)
-        p, force = np.array([60e3, 75e3, 90e3]), np.array([0.05, 0.15, 0.3])
-        dome = press(pad, p, force)
-        blank = np.full(3, np.nan)
-        for height, gap in ((dome.height, blank), (blank, dome.gap)):
-            data = dataclasses.replace(
-                NOTHING, pressed=PressedDomes(p, force, height, blank, blank, gap)
-            )
-            found = calibrate(data, FOOT)
-            assert constants(found)['stiffness'].value == pytest.approx(47.0, rel=1e-9)
-            assert found.foot.pad.stiffness == pytest.approx(47.0, rel=1e-9)
-            assert all(residual.used for residual in found.residuals)
-
     def test_a_single_dome_has_no_interval(self):
         data = dataclasses.replace(NOTHING, free=FreeDomes(np.array([75e3]), np.array([2e-3])))
         k = constants(calibrate(data, FOOT))['stiffness']
@@ -222,8 +208,6 @@ class TestPressures:
         factor = from_pressures(RAW, 'factor', *rows)
         assert factor.value == pytest.approx(1.88, rel=1e-9)
         assert factor.high - factor.low < 1e-6
-        thickness = from_pressures(RAW, 'thickness', *rows)
-        assert thickness.value == pytest.approx(1.88 * THICKNESS, rel=1e-9)
 
     def test_the_factor_of_the_thesis_pad(self):
         """By hand: shares x = 1/ratio, factor Σx/Σx², Student's t = 3.182 on 3 degrees."""
@@ -237,26 +221,13 @@ class TestPressures:
         assert math.log(factor.high / value) == pytest.approx(width, rel=0.02)
         assert math.log(value / factor.low) == pytest.approx(width, rel=0.02)
 
-    def test_intervals_hold_the_truth_as_often_as_they_say(self):
-        height = np.linspace(0.8e-3, 2.4e-3, 6)
-        true = 1.88 * pressure_for_height(RAW, height)
-        inside = 0
-        for seed in range(200):
-            noisy = true * (1 + 0.03 * np.random.default_rng(seed).standard_normal(6))
-            factor = from_pressures(RAW, 'factor', noisy, height)
-            inside += factor.low <= 1.88 <= factor.high
-        assert 0.90 <= inside / 200 <= 0.99
-
     @pytest.mark.parametrize(
-        ('name', 'why'),
-        [
-            ('ecoflex_00_30', 'at most .* m, at .* Pa, is allowed; there it balloons'),
-            ('dragon_skin_10', 'its range ends, a uniaxial stretch of 4.5'),
-        ],
+        ('name', 'highest'),
+        [('ecoflex_00_30', '0.002185'), ('dragon_skin_10', '0.002694')],
     )
-    def test_heights_that_no_dome_has_are_refused(self, name, why):
+    def test_heights_that_no_dome_has_are_refused(self, name, highest):
         pad = Pad.of(Material.load(name), RADIUS, THICKNESS)
-        with pytest.raises(InvalidInput, match=f'height = 0.0035 m of a free dome .*{why}'):
+        with pytest.raises(InvalidInput, match=f'height = 0.0035 .* to {highest}.* m is needed'):
             pressure_for_height(pad, np.array([1e-3, 3.5e-3]))
 
 
@@ -272,82 +243,34 @@ class TestMaterial:
         reference = json.loads((REFERENCE / 'hyper_thesis.json').read_text())['thesis']
         assert factor.value == pytest.approx(reference['factor'], abs=0.005)
         assert 1.5 < factor.low < 1.8 < 1.95 < factor.high < 2.1
-        assert 'explain (1 to 2.1): strain is crosshead travel' in found.warnings[0]
+        assert 'explain (1 to 2.1)' in found.warnings[0]
         assert found.foot.pad.material.factor_range == (factor.low, factor.high)
         errors = [r.error for r in found.residuals if r.setting.startswith('free')]
         np.testing.assert_allclose(errors, reference['errors'], atol=0.003)
         # The maximum pressure of 46.65 kPa as given is 87.6 kPa with the factor.
         assert found.foot.ceiling == 87e3
 
-    def test_the_thickness_in_its_place(self):
-        found = calibrate(THESIS, FOOT, fit='thickness', rubber=self.pad)
-        assert found.foot.pad.thickness == pytest.approx(1.88 * 4e-4, abs=2e-6)
-        assert found.foot.pad.material == self.pad.material
-
-    def test_pressed_domes_alone_give_factor_or_thickness(self):
-        """A pressed dome of the reference rows: 1.88 times the law, or the thickness."""
-        rows = json.loads((REFERENCE / 'hyper_pressed.json').read_text())['rows']
-        kept = [row for row in rows if row['law'] == 'DS10_raw_l4.5 x1.88']
-        columns = [np.array([row[key] for row in kept]) for key in
-                   ('pressure_Pa', 'force_N', 'gap_m')]  # fmt: skip
-        blank = np.full(len(kept), np.nan)
-        pressed = PressedDomes(*columns[:2], blank, blank, blank, columns[2])
-        data = dataclasses.replace(NOTHING, pressed=pressed)
-        for fit, value in (('factor', 1.88), ('thickness', 1.88 * 4e-4)):
-            found = constants(calibrate(data, FOOT, fit=fit, rubber=self.pad))[fit]
-            assert found.value == pytest.approx(value, rel=1e-6)
-            assert found.points == len(kept) > 1
-
     def test_the_foot_file_is_the_calibrated_foot(self, tmp_path):
-        for fit in ('factor', 'thickness'):
-            found = calibrate(THESIS, FOOT, fit=fit, rubber=self.pad)
-            path = tmp_path / f'{fit}.yaml'
-            path.write_text(foot_file(found))
-            pad = Foot.load(path).pad
-            assert pad.thickness == pytest.approx(found.foot.pad.thickness, rel=1e-8)
-            for each in ('factor', 'factor_range'):
-                value = getattr(found.foot.pad.material, each)
-                assert getattr(pad.material, each) == pytest.approx(value, rel=1e-8)
-            assert 'fitted: ' in path.read_text()
-            # The foot is a start for another fit, which finds the same.
-            again = calibrate(THESIS, Foot.load(path), fit=fit)
-            value = constants(found)[fit].value
-            assert constants(again)[fit].value == pytest.approx(value, rel=1e-7)
+        found = calibrate(THESIS, FOOT, rubber=self.pad)
+        path = tmp_path / 'own.yaml'
+        path.write_text(foot_file(found))
+        pad = Foot.load(path).pad
+        assert pad.thickness == pytest.approx(found.foot.pad.thickness, rel=1e-8)
+        for each in ('factor', 'factor_range'):
+            value = getattr(found.foot.pad.material, each)
+            assert getattr(pad.material, each) == pytest.approx(value, rel=1e-8)
+        # The foot is a start for another fit, which finds the same.
+        again = constants(calibrate(THESIS, Foot.load(path)))['factor']
+        assert again.value == pytest.approx(constants(found)['factor'].value, rel=1e-7)
 
-    def test_a_single_dome_has_no_interval(self):
-        """One reference row, 1.88 times the law at 55 kPa."""
-        free = FreeDomes(np.array([55e3]), np.array([0.0013152800343899924]))
-        found = calibrate(dataclasses.replace(NOTHING, free=free), FOOT, rubber=self.pad)
-        factor = constants(found)['factor']
-        assert factor.value == pytest.approx(1.88, rel=1e-9)
-        assert math.isnan(factor.low) and math.isnan(factor.high)
-        assert found.foot.pad.material.factor_range == (1.0, 2.1)
-        assert 'too few for an interval' in foot_file(found)
-
-    def test_a_factor_that_nothing_explains_is_named(self):
-        doubted = dataclasses.replace(self.pad.material, factor_range=(0.9, 1.2))
-        found = calibrate(THESIS, FOOT, rubber=Pad.of(doubted, 1.5e-3, 4e-4))
-        assert 'the factor 1.88 is outside 0.9 to 1.2, which' in found.warnings[0]
-
-    def test_a_fit_without_a_material_or_of_no_pad_is_refused(self):
-        for fit in ('factor', 'thickness'):
-            with pytest.raises(InvalidInput, match=f"fit = '{fit}' .* without a material"):
-                calibrate(THESIS, FOOT, fit=fit)
-        with pytest.raises(InvalidInput, match=r"fit = 'law' .*factor, thickness"):
-            calibrate(THESIS, FOOT, fit='law')
+    def test_a_fit_of_no_pad_is_refused(self):
         # A sheet of Ecoflex balloons before it is 2.4 mm high.
         soft = Pad.of(Material.load('ecoflex_00_30'), 1.5e-3, 4e-4)
-        with pytest.raises(InvalidInput, match=r'thesis\.csv: height = 0\.0024 m .* balloons'):
+        with pytest.raises(InvalidInput, match=r'thesis\.csv: height = 0\.0024 .* m is needed'):
             calibrate(THESIS, FOOT, rubber=soft)
         low = FreeDomes(np.array([900e3]), np.array([1.25e-3]))
-        with pytest.raises(InvalidInput, match='the fit gives no pad: factor = 32'):
+        with pytest.raises(InvalidInput, match=r'factor = 32.* check the units'):
             calibrate(dataclasses.replace(NOTHING, free=low), FOOT, rubber=self.pad)
-        with pytest.raises(InvalidInput, match=r'the fit gives no pad: thickness = 0\.0129'):
-            data = dataclasses.replace(NOTHING, free=low)
-            calibrate(data, FOOT, fit='thickness', rubber=self.pad)
-        bonded = dataclasses.replace(self.pad, edge='bonded')
-        with pytest.raises(InvalidInput, match='edge = bonded is not allowed in a calibration'):
-            calibrate(THESIS, FOOT, rubber=bonded)
         unnamed = Pad.of(dataclasses.replace(self.pad.material, name=''), 1.5e-3, 4e-4)
         with pytest.raises(InvalidInput, match='has no name'):
             foot_file(calibrate(THESIS, FOOT, rubber=unnamed))
@@ -358,7 +281,7 @@ class TestForceLimit:
         data = dataclasses.replace(
             NOTHING, force_limits=ForceLimits(np.array([60e3, 80e3]), np.array([0.4, 0.2]))
         )
-        with pytest.raises(InvalidInput, match=r'slope = -1e-05 N/Pa'):
+        with pytest.raises(InvalidInput, match=r'slope = -1e-05 is'):
             calibrate(data, FOOT)
 
     def test_one_pressure_keeps_the_line_with_a_warning(self):
@@ -419,12 +342,14 @@ class TestFriction:
     def test_wet_floors_need_the_time_of_stance(self):
         data = slips_of(OTHER, WET)
         blank = data.friction._replace(stance_time=np.full(len(WET), np.nan))
-        with pytest.raises(InvalidInput, match='needs stance_time'):
+        with pytest.raises(InvalidInput, match='stance_time on a wet floor = nan'):
             calibrate(dataclasses.replace(data, friction=blank), FOOT)
 
     def test_pressures_above_the_ceiling_are_refused(self):
         data = slips_of(dataclasses.replace(OTHER, ceiling=91e3), [(91e3, 2.0, False, 0.0)] * 2)
-        with pytest.raises(InvalidInput, match='above the ceiling'):
+        with pytest.raises(
+            InvalidInput, match=r'pressure of a friction row .* = 91000\.0 .* 0 to 90000'
+        ):
             calibrate(data, FOOT)
 
 
@@ -469,13 +394,12 @@ def text_of(tmp_path, text):
 @pytest.mark.parametrize(
     ('text', 'complaint'),
     [
-        ('pressure [kPa],height [mm]\n0,1\n', 'pressure of a free dome = 0 '),
-        ('pressure [kPa],height [mm]\n0,1\n55,1.2\n', 'pressure of a free dome = 0 '),
-        ('pressure [kPa],force [N],gap [mm]\n0,0.1,1\n', 'pressure of a pressed dome = 0 '),
-        ('pressure [kPa],force [N],gap [mm]\n75,0.1,0\n', 'gap = 0 '),
+        ('pressure [kPa],height [mm]\n0,1\n', 'pressure of a free dome = 0\\.0 '),
+        ('pressure [kPa],force [N],gap [mm]\n0,0.1,1\n', 'pressure of a pressed dome = 0\\.0 '),
+        ('pressure [kPa],force [N],gap [mm]\n75,0.1,0\n', 'gap = 0\\.0 '),
         (
             'pressure [kPa],force [N],height [mm]\n75,0.1,0\n',
-            'height of a pressed dome = 0 ',
+            'height of a pressed dome = 0\\.0 ',
         ),
     ],
 )
@@ -489,30 +413,17 @@ def test_zeros_cannot_be_fitted(tmp_path, text, complaint):
     [
         (
             'pressure [kPa],height [mm]\n75,1e-6\n',
-            r'stiffness = 8\.437e\+07 N/m.*from 1 to',
+            r'stiffness = 8437.*from 1 to',
         ),
         (
             'pressure [kPa],force_limit [N]\n75,0.3\n85,0.30000001\n',
-            r'force_limit_slope = 1e-12 N/Pa.*from 1e-09 to 1 N/Pa is needed',
+            r'force_limit_slope = .*e-1\d .*from 1e-09 to 1 N/Pa is needed',
         ),
     ],
 )
 def test_constants_that_no_foot_file_may_hold_are_refused(tmp_path, text, complaint):
     with pytest.raises(InvalidInput, match=complaint):
         calibrate(text_of(tmp_path, text), FOOT)
-
-
-def test_the_start_foot_may_have_any_path(tmp_path):
-    start = tmp_path / 'pads: "soft" #2.yaml'
-    start.write_text(
-        (configuration.shared_folder() / 'feet' / 'large37.yaml').read_text(encoding='utf-8'),
-        encoding='utf-8',
-    )
-    found = calibrate(THESIS, Foot.load(start))
-    (tmp_path / 'mine.yaml').write_text(foot_file(found), encoding='utf-8')
-    assert Foot.load(tmp_path / 'mine.yaml').pad.stiffness == pytest.approx(
-        found.foot.pad.stiffness, rel=1e-8
-    )
 
 
 def test_a_single_force_limit_past_the_thesis_measurements_stops_no_fit(tmp_path):

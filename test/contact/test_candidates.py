@@ -41,21 +41,6 @@ def test_a_material_by_reference_rows():
     assert (found.balloons, found.carried) == (True, 'yes')
 
 
-def test_a_least_height_by_reference_rows():
-    material = RAW.times(1.0, (1.0, 1.88))
-    found = one(1.0, material, height=0.00190652850585761)
-    # Pressures of equal domes are in proportion to the factor.
-    assert found.pressure == pytest.approx((40e3, 40e3, 75.2e3), rel=1e-7)
-    assert found.height == pytest.approx((0.00190652850585761,) * 3, rel=1e-7)
-    # 46.65 kPa is the maximum; the range of the material ends just below.
-    assert found.largest_pressure == pytest.approx((46.65e3, 46.65e3, 87.7e3), rel=1e-3)
-    assert found.ballooning_margin.high == pytest.approx(46.65 / 40.0, rel=1e-3)
-    assert not found.balloons
-    # Twice as thick, twice the pressure.
-    thick = one(1.0, material, 2 * THICKNESS, height=0.00190652850585761)
-    assert thick.pressure == pytest.approx((80e3, 80e3, 150.4e3), rel=1e-7)
-
-
 def test_doubt_decides_between_yes_and_no():
     # 4/7 of the stress balloons at 43 kPa; 45 kPa are needed.
     found = one(45e3 * FLAT / 1.2)
@@ -67,19 +52,15 @@ def test_doubt_decides_between_yes_and_no():
     assert one(45e3 * FLAT / 1.2, ceiling=44e3).carried == 'no'
     assert one(200e3 * FLAT).carried == 'no'
     assert one(200e3 * FLAT, ceiling=300e3, margin=1.0).carried == 'no'
-    assert one(40e3 * FLAT / 1.2, height=2e-3).pressure == (math.inf,) * 3
 
 
 @pytest.mark.parametrize(
     ('share', 'slack', 'rules'),
     [
         (1.0, 1e-9, {}),
-        (1.0, 1e-9, {'height': 1.2e-3}),
         # A soft pad balloons below the ceiling, a stiff one is lower there and carries less: the
         # best factor is in between.
         (0.3, 0.01, {'criterion': 'thickness', 'ceiling': 60e3}),
-        (0.3, 0.01, {'criterion': 'wall', 'ceiling': 60e3}),
-        (0.3, 0.01, {'criterion': 'thickness', 'ceiling': 60e3, 'height': 1.2e-3}),
     ],
 )
 def test_every_factor_of_the_range_is_within_the_spans(share, slack, rules):
@@ -102,14 +83,12 @@ def test_a_factor_inside_the_range_may_decide():
     assert found.pressure.low < 60e3 < found.pressure.high
 
 
-def test_order_number_of_pads_and_progress():
-    shares = []
-    found = candidates(1.0, AREA, [RAW, NEO], [2e-4, 4e-4], RADIUS, pads=7, progress=shares.append)
+def test_order_and_number_of_pads():
+    found = candidates(1.0, AREA, [RAW, NEO], [2e-4, 4e-4], RADIUS, pads=7)
     assert [(each.pad.material, each.pad.thickness) for each in found] == [
         *((RAW, 2e-4), (RAW, 4e-4), (NEO, 2e-4), (NEO, 4e-4))
     ]
     assert {each.pads for each in found} == {7}
-    assert shares == [0.25, 0.5, 0.75, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -119,7 +98,6 @@ def test_order_number_of_pads_and_progress():
         ({'thickness': 2e-3}, r'thickness = 0\.002 .* up to 0\.0015 m'),
         ({'ceiling': 0.0}, 'ceiling = 0'),
         ({'margin': -1.0}, 'margin = -1'),
-        ({'height': -1e-3}, r'height = -0\.001'),
         ({'criterion': 'max_depth'}, "criterion = 'max_depth'"),
         ({'pads': 0}, 'pads = 0'),
     ],

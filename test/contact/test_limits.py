@@ -24,8 +24,8 @@ from ros_pad.contact.limits import criteria, largest_pressure, resized
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import InvalidInput, NoEquilibrium
 
-CRITERIA = ('thickness', 'wall', 'flattening', 'max_depth', 'measured')
-OF_ANY_CAP = CRITERIA[:4]
+CRITERIA = ('thickness', 'flattening', 'measured')
+OF_ANY_CAP = CRITERIA[:2]
 KILOPASCALS = np.array([65.0, 75.0, 85.0])
 REFERENCE = json.loads(
     (pathlib.Path(__file__).parents[1] / 'reference' / 'force_limits.json').read_text('utf-8')
@@ -47,49 +47,26 @@ def test_measured_is_the_fit_to_three_measurements():
     np.testing.assert_allclose(limit, [0.15, 0.30, 0.40], atol=0.017)  # the measurements
 
 
-def test_measured_is_zero_at_low_pressure():
-    assert force_limit(LARGE_PAD, 52.3e3, 'measured') == 0.0
-    assert force_limit(LARGE_PAD, 52.4e3, 'measured') > 0.0
-
-
-@pytest.mark.parametrize(
-    'pad', [SMALL_PAD, Pad(1.5e-3, 80.0), Pad(1.4e-3, 40.0), resized(LARGE_PAD, 1e-3), RUBBER]
-)
+@pytest.mark.parametrize('pad', [Pad(1.5e-3, 80.0), resized(LARGE_PAD, 1e-3), RUBBER])
 def test_measured_holds_for_no_other_pad(pad):
     assert 'measured' not in criteria(pad)
     for function in (force_limit, pressure_for):
         with pytest.raises(InvalidInput, match='no force limit was measured on it; a measured_li'):
             function(pad, 0.1, 'measured')
-    with pytest.raises(InvalidInput, match='one of thickness, wall, flattening'):
+    with pytest.raises(InvalidInput, match='one of thickness, flattening'):
         largest_pressure(pad, 'measured')
 
 
-def test_a_line_stays_with_the_radius_that_was_measured():
-    own = Pad(2e-3, 60.0, measured_limit=MeasuredLimit(0.5, 60e3, 2e-5))
-    assert resized(own, 2e-3) is own
-    assert resized(own, 1e-3).measured_limit is None
-
-
-@pytest.mark.parametrize('criterion', ['flattening', 'thickness', 'wall'])
+@pytest.mark.parametrize('criterion', OF_ANY_CAP)
 def test_limits_of_the_membrane_are_those_of_the_reference(criterion):
     pressures, limits = REFERENCE['pressures'], REFERENCE['limits'][criterion]
     np.testing.assert_allclose(force_limit(RUBBER, pressures, criterion), limits, rtol=2e-3)
     np.testing.assert_allclose(pressure_for(RUBBER, limits, criterion), pressures, rtol=3e-3)
 
 
-def test_stiffer_rubber_lowers_the_limit_of_the_wall():
-    for times, limit in REFERENCE['stiffer']['wall'].items():
-        found = force_limit(rubber(float(times)), 75e3, 'wall')
-        assert found == pytest.approx(limit, rel=2e-3)
-
-
 @pytest.mark.parametrize(
     'pad',
-    [LARGE_PAD, SMALL_PAD, RUBBER, Pad(1.5e-3, 40.0)]
-    + [
-        Pad.of(Material('neo_hookean', (1.5e5,)), 1.5e-3, share * 1.5e-3)
-        for share in (0.1, 0.27, 0.4)  # up to the pressure at which it balloons
-    ],
+    [LARGE_PAD, SMALL_PAD, Pad.of(Material('neo_hookean', (1.5e5,)), 1.5e-3, 0.4e-3)],
 )
 def test_the_default_is_never_zero_where_a_dome_stands(pad):
     pressures = np.linspace(DOME_PRESSURE, largest_pressure(pad), 300)
@@ -112,27 +89,6 @@ def test_at_the_thickness_the_gap_is_that_of_the_sheet(pad):
         np.testing.assert_allclose(gap, 0.5 * inflate(each, p).height, rtol=1e-9)
 
 
-def test_half_the_height_is_below_every_measured_limit_but_for_their_rounding():
-    assert (force_limit(Pad(1.5e-3, 40.0), KILOPASCALS * 1e3) < [0.155, 0.305, 0.405]).all()
-
-
-def test_at_the_limit_of_the_wall_a_cap_is_a_hemisphere():
-    limits = force_limit(LARGE_PAD, KILOPASCALS * 1e3, 'wall')
-    height = press(LARGE_PAD, KILOPASCALS * 1e3, limits).height
-    np.testing.assert_allclose(height, 1.5e-3, rtol=1e-9)
-    # A free hemisphere has P = 6 sin 45° - 2 sin 90°.
-    first = (6 * math.sqrt(0.5) - 2) * 40 / 1.5e-3
-    assert pressure_for(LARGE_PAD, 0.0, 'wall') == pytest.approx(first, rel=1e-8)  # adhesion
-    assert force_limit(LARGE_PAD, 0.999 * first, 'wall') == 0.0
-    assert force_limit(LARGE_PAD, 1.001 * first, 'wall') > 0.0
-
-
-@pytest.mark.parametrize('criterion', ['thickness', 'wall', 'max_depth'])
-def test_a_stiffer_cap_carries_less_at_one_pressure(criterion):
-    forces = [force_limit(Pad(1.5e-3, k, thickness=0.4e-3), 75e3, criterion) for k in (40, 44)]
-    assert forces[1] < 0.99 * forces[0]
-
-
 @pytest.mark.parametrize('criterion', OF_ANY_CAP)
 def test_at_one_shape_the_limit_is_proportional_to_stiffness_and_radius(criterion):
     one = Pad(1.5e-3, 40.0, 0.006, thickness=0.4e-3)
@@ -140,15 +96,6 @@ def test_at_one_shape_the_limit_is_proportional_to_stiffness_and_radius(criterio
     pressures = KILOPASCALS * 1e3
     ratio = force_limit(other, 9 * pressures, criterion) / force_limit(one, pressures, criterion)
     np.testing.assert_allclose(ratio, 1.0, rtol=1e-9)
-
-
-def test_flattening_matches_its_first_order_closed_form():
-    p = KILOPASCALS * 1e3
-    limit = force_limit(LARGE_PAD, p, 'flattening')
-    r = LARGE_PAD.radius
-    closed = math.pi * r * (p * r - math.sqrt(2 * 0.006 * 40))
-    np.testing.assert_allclose(limit, closed, rtol=1e-4)
-    np.testing.assert_allclose(limit, [0.456, 0.527, 0.598], atol=5e-4)
 
 
 @given(st.floats(600.0, 91e3))
@@ -160,30 +107,10 @@ def test_flattening_is_where_press_ends(pressure):
     assert caught.value.status == 'flattened'
 
 
-def test_max_depth_at_the_measured_pressures():
-    limit = force_limit(LARGE_PAD, KILOPASCALS * 1e3, 'max_depth')
-    np.testing.assert_allclose(limit, [0.256, 0.323, 0.413], atol=1.5e-3)
-
-
-@pytest.mark.parametrize('adhesion_energy', [0.0, 0.006, 0.4])
-def test_max_depth_is_the_deepest_of_all_forces(adhesion_energy):
-    pad = Pad(1.5e-3, 40.0, adhesion_energy)
-    for pressure in np.linspace(1e3, 90e3, 12):
-        top = force_limit(pad, pressure, 'flattening')
-        if top == 0:
-            assert force_limit(pad, pressure, 'max_depth') == 0
-            continue
-        forces = np.linspace(1e-3, 1 - 1e-9, 4001) * top
-        depth = press(pad, pressure, forces).depth
-        limit = force_limit(pad, pressure, 'max_depth')
-        assert limit == pytest.approx(forces[depth.argmax()], abs=1.5 * (forces[1] - forces[0]))
-
-
 @pytest.mark.parametrize(
     ('criterion', 'pad'),
     [(each, LARGE_PAD) for each in CRITERIA]
-    + [(each, pad) for each in OF_ANY_CAP for pad in (SMALL_PAD, Pad(1.5e-3, 40.0, 0.0))]
-    + [(each, RUBBER) for each in OF_ANY_CAP[:3]],
+    + [(each, pad) for each in OF_ANY_CAP for pad in (Pad(1.5e-3, 40.0, 0.0), RUBBER)],
 )
 def test_pressure_for_inverts_the_limit(criterion, pad):
     pressure = np.linspace(0.67, 0.98, 15) * largest_pressure(pad)
@@ -196,12 +123,6 @@ def test_pressure_for_inverts_the_limit(criterion, pad):
     assert isinstance(single, float)
     assert single == pytest.approx(pressure[3], rel=1e-12)
     assert isinstance(force_limit(pad, float(pressure[0]), criterion), float)
-
-
-def test_pressure_for_no_force_is_where_the_limit_leaves_zero():
-    assert pressure_for(LARGE_PAD, 0.0, 'measured') == pytest.approx(75e3 - 0.2833 / 1.25e-5)
-    spread = math.sqrt(2 * 0.006 * 40) / 1.5e-3  # adhesion alone spreads the contact to the rim
-    assert pressure_for(LARGE_PAD, 0.0, 'flattening') == pytest.approx(spread, rel=1e-3)
 
 
 @pytest.mark.parametrize('criterion', CRITERIA)
@@ -237,7 +158,7 @@ def test_bad_words():
     with pytest.raises(InvalidInput, match='margin'):
         pressure_for(LARGE_PAD, 0.1, margin=0.0)
     for function in (force_limit, pressure_for):
-        with pytest.raises(InvalidInput, match='thickness, wall, flattening, max_depth, measured'):
+        with pytest.raises(InvalidInput, match='thickness, flattening, measured'):
             function(LARGE_PAD, 0.1, 'strength')
     with pytest.raises(InvalidInput, match='broadcast'):
         pressure_for(LARGE_PAD, [0.1, 0.2], margin=[1.0, 2.0, 3.0])

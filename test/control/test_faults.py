@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-import math
 
-from ros_pad.control.faults import KINDS, Kind, joined, text
-from ros_pad.estimation import doubt as doubts
+from ros_pad.control.faults import KINDS, Kind, text
 
 
 def test_codes_are_the_places_in_the_table():
@@ -18,16 +16,3 @@ def test_a_fault_is_text_for_people_and_three_numbers_for_records():
     assert str(fault) == 'leaks or lacks air: 45.0 kPa, 25.0 kPa below the set-point'
     assert text(fault.kind.code, fault.a, fault.b) == str(fault)
     assert str(Kind.SILENCE(0.52, 70e3)) == 'no reading for 0.5 s, the last was 70.0 kPa'
-
-
-def test_no_fault_has_no_text():
-    assert text(0.0, math.nan, math.nan) == joined(None, '') == ''
-    assert text(math.nan, 0.0, 0.0) == text(99.0, 0.0, 0.0) == text(0.5, 1.0, 1.0) == ''
-
-
-def test_a_doubt_about_sensors_names_itself():
-    doubt = Kind.DOUBT(doubts.LOST)
-    assert (str(doubt), doubt.label) == ('marker lost', 'marker lost')
-    assert joined(Kind.STUCK(5e3), doubt) == (
-        'stuck: 5.0 kPa, neither fills nor vents; marker lost'
-    )

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import dataclasses
 import math
 
 import pytest
@@ -9,10 +8,6 @@ from hypothesis import strategies as st
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints, FrictionFelt
 from ros_pad.errors import InvalidInput
-
-
-def test_nothing_felt_is_the_prior():
-    assert Footprints(wet_prior=0.3).wet_probability(1.0, 2.0) == 0.3
 
 
 @pytest.mark.parametrize(('distance', 'share'), [(0.0, 1.0), (0.5, 0.606531), (2.0, 0.135335)])
@@ -32,28 +27,6 @@ def test_the_strongest_wins():
     # by 0.4. Near the dry footprint that one counts.
     assert prints.wet_probability(0.5, 0.0) == pytest.approx(0.5 + 0.45 * math.exp(-0.5))
     assert prints.wet_probability(0.9, 0.0) == pytest.approx(0.5 - 0.4 * math.exp(-0.1))
-
-
-def test_of_equal_ones_the_last_wins():
-    prints = Footprints()
-    prints.add(0.0, 0.0, 0.9)
-    prints.add(0.0, 0.0, 0.1)
-    assert prints.wet_probability(0.0, 0.0) == pytest.approx(0.1)
-
-
-def test_an_undecided_footprint_hides_none():
-    prints = Footprints()
-    prints.add(0.0, 0.0, 0.9)
-    prints.add(0.0, 0.0, 0.5)
-    assert prints.wet_probability(0.0, 0.0) == pytest.approx(0.9)
-
-
-def test_memory_is_short():
-    prints = Footprints(memory=3)
-    prints.add(0.0, 0.0, 0.99)
-    for step in range(3):
-        prints.add(10.0 + step, 0.0, 0.4)
-    assert prints.wet_probability(0.0, 0.0) == pytest.approx(0.5, abs=1e-4)
 
 
 @given(
@@ -83,11 +56,6 @@ FOOT, LOAD = Foot.load('large37'), 6.8
 """By the numbers of feet/large37.yaml: 0.80 flat on dry ground, 0.41 as a dome."""
 
 
-def test_without_steps_the_foot_file_decides():
-    assert FrictionFelt(FOOT, LOAD).flat_pays
-    assert not FrictionFelt(dataclasses.replace(FOOT, shear_strength=0.0), LOAD).flat_pays
-
-
 def test_adhesion_that_is_not_there_is_found_within_some_steps():
     """By hand: 0.41 + 0.39 · 0.8^n is below 1.4 · 0.41 after n = 4 steps."""
     felt = FrictionFelt(FOOT, LOAD)
@@ -96,14 +64,6 @@ def test_adhesion_that_is_not_there_is_found_within_some_steps():
         felt.add(True, 0.05, 0.41)
         paid.append(felt.flat_pays)
     assert paid == [True] * 3 + [False] * 27
-
-
-@pytest.mark.parametrize(('flat', 'wet'), [(False, 0.05), (True, 0.4)])
-def test_only_flat_feet_on_dry_ground_show_it(flat, wet):
-    felt = FrictionFelt(FOOT, LOAD)
-    for _ in range(100):
-        felt.add(flat, wet, 0.41)
-    assert felt.flat_pays
 
 
 def test_feet_do_not_change_their_mind_between_the_factors():

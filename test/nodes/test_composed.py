@@ -3,20 +3,15 @@
 
 import contextlib
 import dataclasses
-import gc
 import math
 import os
 import signal
-import subprocess
-import sys
-import threading
 import time
-from collections import Counter
 
 import numpy as np
 import pytest
 import rclpy
-from helpers import MS, overrides, pressure
+from helpers import MS, pressure
 from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -28,9 +23,8 @@ from ros_pad.bags import BagReader, BagWriter
 from ros_pad.bags.wire import Wire
 from ros_pad.errors import BagError, PadError
 from ros_pad.estimation import doubt as doubts
-from ros_pad.nodes import composed, topics
+from ros_pad.nodes import composed
 from ros_pad.nodes.composed import ComposedTrial
-from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.records import KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
@@ -109,22 +103,6 @@ def test_the_nodes_walk_as_the_loop_without_ros_does(name, policy, cycles, moves
     assert np.max(on_nodes.pressure) > 30e3
     assert sum(on_nodes.metrics.switches) >= moves
     assert on_nodes.metrics.distance_m > 0.0
-
-
-def test_no_node_stays_behind(tmp_path):
-    """A second walk in one process must not find nodes of the first one on the graph."""
-    gc.collect()
-    held = living_nodes()  # nodes of other tests are not counted
-    gc.disable()  # else the collector could destroy nodes at any time
-    try:
-        composed.run(scene_of('leg_wet_dome_60', 1), 'dome', seed=2, bag=tmp_path / 'bag')
-        assert not [each for each in living_nodes() if not any(each is old for old in held)]
-    finally:
-        gc.enable()
-
-
-def living_nodes():
-    return [each for each in gc.get_objects() if isinstance(each, Node)]
 
 
 def test_faults_come_to_both_alike_and_records_have_the_true_pressures(tmp_path):
@@ -249,35 +227,6 @@ def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
         assert [each.last_ns for each in blocks] == [at for at, _ in recorded[name]]
 
 
-def test_another_recorder_receives_what_the_trial_publishes(context, executor, until, tmp_path):
-    values = {'folder': str(tmp_path / 'other'), 'reliable': True, 'legs': [1]}
-    other = RecorderNode(context=context, parameter_overrides=overrides(values))
-    executor.add_node(other)
-    with trial_of(scene_of('leg_wet_dome_60', 2), 'dome', 0, tmp_path / 'bag') as trial:
-        names = {other.resolve_topic_name(name) for name in topics.names()}
-        inside = Counter(s.topic_name for node in trial._nodes for s in node.subscriptions)
-        publishers = [
-            each for node in trial._nodes for each in node.publishers if each.topic_name in names
-        ]
-        assert len(publishers) > 6
-
-        def found():
-            counts = inside + Counter({'/clock': 1})  # the recorder's own are not listed
-            return all(
-                each.get_subscription_count() > counts[each.topic_name] for each in publishers
-            )
-
-        until(found, what='the other recorder')
-        trial.walk(lambda at: executor.spin_once(timeout_sec=0.0))
-        trial.recorder._take()
-        until(lambda: other.message_count == trial.recorder.message_count)
-    other.close()
-    bags = raw_messages(tmp_path / 'bag'), raw_messages(tmp_path / 'other')
-    one, two = ({name: [data for _, data in m] for name, m in bag.items()} for bag in bags)
-    assert one == two
-    assert len(one['/feet/sample']) > 500
-
-
 # --- ends ---------------------------------------------------------------------------------------
 
 
@@ -303,11 +252,6 @@ def test_a_trial_that_is_stopped_leaves_the_pads_flat(tmp_path):
     assert len(found['sample'].stamps) == round(trial.simulator.robot.time * 250)
 
 
-def test_a_trial_that_comes_to_its_end_leaves_the_pads_flat(tmp_path):
-    composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
-    check_vented(tmp_path / 'bag')
-
-
 def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
     before = signal.getsignal(signal.SIGTERM)
     sent = []
@@ -324,36 +268,6 @@ def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
     assert 2.5 < trial.metrics.duration_s < 2.8
     assert signal.getsignal(signal.SIGTERM) is before
     check_vented(tmp_path / 'bag')
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
-    arguments = ['run', 'hexapod_patches', '--cycles', '300', '--policy', 'dome']
-    out = tmp_path / 'out'
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'ros_pad.cli', *arguments, '--out', str(out)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        deadline = time.monotonic() + 300.0
-
-        def recorded():
-            return sum(file.stat().st_size for file in out.glob('bag/*.mcap'))
-
-        while recorded() < 200_000 and process.poll() is None:
-            assert time.monotonic() < deadline, 'the bag does not grow'
-            time.sleep(0.05)
-        process.send_signal(number)
-        _, errors = process.communicate(timeout=300)
-    finally:
-        process.kill()
-    assert process.returncode == 130, errors
-    assert 'pads vented, bag closed' in errors
-    assert 'Traceback' not in errors
-    check_vented(out / 'bag')
 
 
 class Hasty:
@@ -426,26 +340,6 @@ def test_a_full_disk_ends_the_trial_with_its_message(context, monkeypatch, tmp_p
         assert time.monotonic() < deadline
         time.sleep(0.05)
     observer.destroy_node()
-
-
-def test_a_bag_that_exists_is_not_overwritten(tmp_path):
-    (tmp_path / 'bag').mkdir()
-    with pytest.raises(BagError, match='exists'):
-        composed.run(scene_of('hexapod_patches', 1), 'flat', bag=tmp_path / 'bag')
-    assert list((tmp_path / 'bag').iterdir()) == []
-
-
-def test_it_runs_in_a_thread_too(tmp_path):
-    """Only the main thread can handle signals; in other threads a trial does not try to."""
-    found = []
-
-    def walk():
-        found.append(composed.run(scene_of('leg_wet_flat', 1), bag=tmp_path / 'bag'))
-
-    thread = threading.Thread(target=walk)
-    thread.start()
-    thread.join(timeout=300)
-    assert found[0].metrics.duration_s == pytest.approx(scene_of('leg_wet_flat', 1).duration)
 
 
 def test_pad_run_hides_its_nodes_and_leaves_the_environment_alone(tmp_path, monkeypatch):

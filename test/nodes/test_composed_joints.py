@@ -5,17 +5,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from ros_pad import configuration, trials
-from ros_pad.bags import BagReader, annotate
-from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.bags import BagReader
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
 from ros_pad.records import ESTIMATE, SAMPLE
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials import replay_body
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay import replay
 
@@ -64,19 +60,6 @@ def test_odom_follows_the_true_body(walked):
     assert miss.max() < 0.03  # of 0.35 m walked
     assert miss.max() > 1e-4  # it is an estimate
     assert np.abs(without.odom[:, 2] - without.body[:, 2]).max() < 0.02
-
-
-def test_feet_are_where_they_truly_are(walked):
-    """In the world of the true body, feet are below the links of the robot."""
-    _, without, _ = walked
-    markers = trials.run(scene_of(3), 'adaptive', seed=2, fidelity='L2')
-    # Both robots stand alike. Markers have noise and ride on sheared pads, up to 1 mm; a tilt that
-    # is off by 0.01 rad moves feet 0.14 m below the body by 1.4 mm.
-    places = [
-        each.position[(each.time > 0.5) & (each.time < 0.999), :, :2]
-        for each in (without, markers)
-    ]
-    assert np.abs(places[0] - places[1]).max() < 3e-3
 
 
 def test_the_bag_has_the_topics_and_their_truths(walked):
@@ -131,17 +114,6 @@ faults:
     assert 'no wrench' in {doubts.kind(code) for code in estimates.rows['doubt'][:, 1]}
 
 
-@pytest.mark.parametrize('fidelity', ['L1', 'L0'])
-def test_levels_without_joints_are_refused(fidelity):
-    with pytest.raises(InvalidInput, match=r"'joints'|L0"):
-        trials.run(scene_of(1), 'flat', fidelity=fidelity, sensing='joints')
-
-
-def test_a_rail_leg_has_no_joints():
-    with pytest.raises(InvalidInput, match=r'leg_dry_flat.*needs fidelity L2'):
-        trials.run('leg_dry_flat', 'flat', sensing='joints')
-
-
 def of_the_body(found):
     return [each for each in found.comparisons if each.topic in ('/odom', '/feet/sample')]
 
@@ -164,56 +136,3 @@ def test_a_replay_of_the_bag_is_equal_to_the_bit(walked):
     # Without the velocities it is another estimate: nothing of markers is in this bag.
     settings = NodeSettings.of(bag).changed({'alarm.threshold': 1.0})
     assert replay(bag, settings).verdict == 'different'
-
-
-def rewritten(path, folder, change):
-    """Copy a bag with other messages of the joints; ``change`` gets their number and lists."""
-    made = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
-    with AnyReader([path]) as reader, made as bag:
-        connections, count = {}, 0
-        for connection, ns, data in reader.messages():
-            if connection.topic not in connections:
-                connections[connection.topic] = bag.add_connection(
-                    connection.topic, connection.msgtype,
-                    msgdef=connection.msgdef.data, rihs01=connection.digest,
-                )  # fmt: skip
-            if connection.topic == '/joint_states':
-                message = reader.deserialize(data, connection.msgtype)
-                for part in ('name', 'position', 'velocity', 'effort'):
-                    setattr(message, part, change(count, getattr(message, part)))
-                data = reader.typestore.serialize_cdr(message, connection.msgtype)
-                count += 1
-            bag.write(connections[connection.topic], ns, data)
-    annotate(folder, BagReader(path).custom_data)
-    return BagReader(folder)
-
-
-def test_joints_are_replayed_in_the_order_of_each_message(walked, tmp_path):
-    def turn(count, values):
-        return values if count % 2 else values[::-1].copy()
-
-    turned = rewritten(walked[-1], tmp_path / 'bag', turn)
-    found = replay(turned)
-    assert found.verdict == 'equal'
-    assert {each.equal for each in of_the_body(found)} == {SAMPLES}
-
-
-def test_a_bag_with_the_joints_of_another_robot_has_a_note(walked, tmp_path):
-    others = rewritten(
-        walked[-1],
-        tmp_path / 'bag',
-        lambda _, values: [f'{each}_' for each in values] if isinstance(values, list) else values,
-    )
-    (note,) = replay(others).notes
-    assert note.startswith('the body estimator is not replayed: joint names without leg_1_coxa')
-
-
-def test_a_bag_without_its_robots_file_is_replayed_but_for_the_body(walked, monkeypatch):
-    def gone(*_):
-        raise ConfigError('mine.yaml: no such file')
-
-    monkeypatch.setattr(replay_body.Robot, 'load', gone)
-    found = replay(BagReader(walked[-1]))
-    assert found.verdict == 'equal'
-    assert found.notes == ['the body estimator is not replayed: mine.yaml: no such file']
-    assert not of_the_body(found)

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import LOAD, MS, SECOND, overrides, pressure, record, sample
+from helpers import LOAD, MS, SECOND, overrides, pressure, sample
 
+from ros_pad.bags import topics
 from ros_pad.errors import ConfigError
 from ros_pad.estimation.doubt import text
 from ros_pad.estimation.scales import GRID, Felt
-from ros_pad.nodes import topics
 from ros_pad.nodes.estimator import EstimatorNode
-from ros_pad.nodes.messages import Messages
 from ros_pad.records import SAMPLE, Block
 
 ERROR, OK, WARN = DiagnosticStatus.ERROR, DiagnosticStatus.OK, DiagnosticStatus.WARN
@@ -67,20 +66,6 @@ class Robot:
 @pytest.fixture
 def robot(bench):
     return Robot(bench)
-
-
-def test_an_estimate_is_one_record_of_all_feet(robot):
-    robot.start()
-    robot.sample()
-    (block,) = robot.estimates
-    assert block.last_ns == 4 * MS
-    for row in block.rows[0]:
-        assert row['position'].tolist() == [0.0, 0.0]
-        assert row['load'] == LOAD
-        assert row['wetness'] == pytest.approx(0.5)
-        assert 0.1 < row['friction'] < 1.0 and row['friction_sd'] > 0.0
-        assert -1.0 < row['margin'] < 1.0
-        assert (row['slipping'], row['slip_speed_sd'] > 0.0) == (0.0, True)
 
 
 def test_an_estimate_has_the_largest_load_and_the_last_position_since_the_last_one(robot):
@@ -151,18 +136,6 @@ def test_a_row_that_is_no_sample_concerns_its_leg_only(robot, case):
     assert np.nanmax(robot.heard('load')) == LOAD
 
 
-def test_samples_that_come_twice_or_late_do_no_harm(robot):
-    node = robot.start()
-    robot.stance(0.1, 0.0, 0.2)
-    used, now_ns = node.stage.used.tolist(), robot.now_ns
-    for stamp_ns in (now_ns, now_ns, now_ns - 8 * MS):
-        robot.bench.give(topics.SAMPLE, sample(stamp_ns))
-    robot.stance(0.1, 0.0, 0.2)
-    assert (node.stage.used >= np.add(used, 50)).all()
-    assert np.isfinite(robot.heard('friction')).all()
-    assert robot.estimates[-1].last_ns == robot.now_ns
-
-
 def test_a_pressure_that_is_missing_leaves_the_last_one_in_force(robot):
     robot.start()
     robot.bench.give(topics.PRESSURE, pressure(1, (80e3, 0.0)))
@@ -172,23 +145,6 @@ def test_a_pressure_that_is_missing_leaves_the_last_one_in_force(robot):
         robot.sample()
     assert robot.doubts()[-1] == 'domed'
     assert 'domed' not in robot.doubts(2)
-
-
-def test_a_foot_that_holds_a_strong_pull_stands_on_dry_ground(robot):
-    robot.start()
-    robot.stance(ratio=0.6, speed=0.0)
-    assert robot.heard('wetness')[-1] < 0.2
-    assert robot.heard('friction')[-1] > 0.6
-    assert not robot.heard('slipping').any()
-
-
-def test_a_foot_that_slides_under_a_weak_pull_stands_on_wet_ground(robot):
-    robot.start()
-    robot.stance(ratio=0.2, speed=0.1)
-    assert robot.heard('wetness')[-1] > 0.8
-    assert robot.heard('friction')[-1] == pytest.approx(0.2, abs=0.1)
-    assert robot.heard('slipping')[-1] == 1.0
-    assert robot.heard('slip')[-1] == pytest.approx([0.1, 0.0], rel=0.1)
 
 
 def test_evidence_of_a_pull_depends_on_the_morphology(robot):
@@ -201,26 +157,7 @@ def test_evidence_of_a_pull_depends_on_the_morphology(robot):
     assert flat < 0.2
 
 
-def test_a_moment_counts_where_there_is_one(robot):
-    """Friction holds the yaw moment: 0.04 N m over the turning radius is half of the load."""
-    robot.start(moment_noise=5e-4)
-    robot.stance(0.05, 0.0, 0.2, moment=0.0)
-    assert robot.heard('wetness')[-1] > 0.4
-    robot.stance(0.05, 0.0, 0.2, moment=[0.04, math.nan])
-    assert robot.heard('wetness')[-1] < 0.2
-    assert robot.heard('wetness', 2)[-1] > 0.4
-
-
 # --- doubts -------------------------------------------------------------------------------------
-
-
-def test_a_doubt_is_in_the_records_as_long_as_it_lasts(robot):
-    robot.start()
-    robot.stance(0.02, 0.0, 0.2)
-    assert robot.doubts() == ['not yet', 'not pulled']
-    # A force that leaps while the marker stays looks like motion at first.
-    robot.stance(0.6, 0.0, 0.6)
-    assert robot.doubts() == ['not yet', 'not pulled', 'undecided', '']
 
 
 def test_a_force_sensor_that_stands_still_is_an_error_at_once(robot):
@@ -252,23 +189,10 @@ def test_feet_without_samples_are_errors_within_a_second(robot):
     assert robot.health()[0] == OK
 
 
-@pytest.mark.parametrize('field', ['force', 'position'])
-def test_a_foot_whose_rows_are_missing_is_an_error_within_a_second(robot, field):
-    robot.start()
-    for _ in range(250):
-        jitter = 1e-9 * math.sin(robot.now_ns)
-        given = {'force': (jitter, 0.0, LOAD + jitter), 'position': (jitter, 0.0, 0.0)}
-        robot.sample(**(given | {field: [HIDDEN, given[field]]}))
-    level, message = robot.health()
-    assert level == ERROR
-    assert message.startswith('no wrench: for ' if field == 'force' else 'no position: for ')
-    assert robot.health(2)[0] == OK
-
-
 def test_rate_and_age_of_the_samples_are_reported(bench, monkeypatch):
     """The times are given, so that the machine does not matter."""
     ticks = []
-    monkeypatch.setattr(Messages, 'on_tick', lambda self, period, call: ticks.append(call))
+    monkeypatch.setattr(EstimatorNode, 'on_tick', lambda self, call: ticks.append(call))
     node = bench.start(EstimatorNode, use_sim_time=False)
     (tick,) = ticks
     start_ns = node.get_clock().now().nanoseconds // SECOND * SECOND + SECOND
@@ -291,23 +215,6 @@ def test_rate_and_age_of_the_samples_are_reported(bench, monkeypatch):
     )  # fmt: skip
     early = second(3, -300 * MS)  # the other clock is ahead
     assert (early.level, early.values[1].value) == (WARN, '-0.300')
-
-
-def test_in_simulated_time_no_rate_is_reported(robot):
-    robot.start()
-    robot.stance(0.1, 0.0, 1.0)
-    assert {each.name for _, each in robot.bench.statuses()} == {
-        *(f'estimator: leg {leg} sensing' for leg in (1, 2)),
-        'estimator: friction of the floor',
-    }
-
-
-def test_samples_of_other_legs_are_refused(robot):
-    node = robot.start()
-    robot.bench.legs = (1, 2, 3)
-    robot.bench.give(topics.SAMPLE, record(SAMPLE, 1, 3, force=(0.0, 0.0, LOAD)))
-    assert node.messages.refusals.counts == {'/feet/sample': 1}
-    assert node.stage.used.tolist() == [0, 0]
 
 
 def test_what_is_learnt_is_kept_and_reported(context, tmp_path):

@@ -2,7 +2,6 @@
 """Faults of regulators on real nodes: reports of the controller and their delay."""
 
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
@@ -106,31 +105,3 @@ def test_each_fault_is_reported_within_a_second_and_the_others_go_on(tmp_path):
     switches = [time[np.flatnonzero(np.diff(each.dome[:, 4]))] for each in (trial, sound)]
     assert switches[0] == pytest.approx(switches[1], abs=0.1)
     assert sound.metrics.faults == []
-
-
-def test_health_is_published_each_second_and_a_lost_supply_reported_by_all(tmp_path):
-    fault = '{kind: supply_loss, start: 3.5, time_constant: 0.1}'
-    # The set-point is constant, as the pressure lags behind one that follows the load.
-    scene = dataclasses.replace(scene_with(tmp_path, 4, [fault]), dome_pressure=75e3)
-    trial = composed.run(scene, 'dome', bag=tmp_path / 'bag')
-    rows = health(tmp_path / 'bag')
-    assert set(rows) == set(trial.legs)
-    for leg, each in rows.items():
-        times = [at for at, _ in each if at < 3.5]
-        assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx([1.0] * 3, abs=0.11)
-        status = each[3][1]
-        assert (status.level, status.message) == (OK, 'dome')
-        assert status.hardware_id == f'leg {leg}'
-        figures = {value.key: value.value for value in status.values}
-        pressure = float(figures['pressure (Pa gauge)'])
-        assert 60e3 < pressure == pytest.approx(float(figures['set-point (Pa gauge)']), abs=600.0)
-        assert figures['shape'] == 'dome'
-        # The regulator needs 0.086 s to 90 %.
-        assert 0.08 < float(figures['time to fill (s)']) < 0.25
-        assert figures['steps decided ahead'] == '0'
-        assert figures['touch-downs with too little pressure'] == '0'
-        at, message = first_error(each)
-        assert 3.5 < at < 4.5
-        # A pad with a new set-point after the loss does not reach it.
-        assert message.startswith(('sags', 'leaks or lacks air', 'does not fill'))
-    assert not trial.dome[trial.slow_time > 4.6].any()

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import json
 import pathlib
@@ -52,45 +51,6 @@ def panels(kind: str) -> Iterator[tuple[str, dict[str, Any]]]:
     for name, config in LAYOUT['configById'].items():
         if name.startswith(f'{kind}!'):
             yield name, config
-
-
-def leaves(tree: Any) -> list[str]:
-    """Return the panels of a tree of splits: names, or two branches with a direction."""
-    if isinstance(tree, str):
-        return [tree]
-    assert set(tree) == {'direction', 'first', 'second', 'splitPercentage'}
-    assert tree['direction'] in ('row', 'column') and 0 < tree['splitPercentage'] < 100
-    return leaves(tree['first']) + leaves(tree['second'])
-
-
-def problems(layout: dict[str, Any]) -> list[str]:
-    """Return the reasons why a viewer cannot open every panel of a layout exactly once."""
-    configs = layout['configById']
-    placed = leaves(layout['layout'])
-    for name in placed:
-        if name.startswith('Tab!'):
-            for tab in configs.get(name, {}).get('tabs', []):
-                placed = placed + leaves(tab['layout'])
-    found = [f'{name}: twice' for name in set(placed) if placed.count(name) > 1]
-    found += [f'{name}: no config' for name in set(placed) - set(configs)]
-    found += [f'{name}: not placed' for name in set(configs) - set(placed)]
-    return found + [
-        f'{name}: unknown kind'
-        for name in configs
-        if not re.fullmatch(f'({"|".join(PANELS)})!\\w+', name)
-    ]
-
-
-def test_the_layout_is_whole():
-    # Keys of Lichtblick's type LayoutData.
-    assert set(LAYOUT) == {
-        *('configById', 'layout', 'globalVariables', 'userNodes', 'playbackConfig')
-    }
-    assert problems(LAYOUT) == []
-    assert {name.partition('!')[0] for name in LAYOUT['configById']} == PANELS
-    broken = copy.deepcopy(LAYOUT)
-    broken['configById']['Plot!other'] = broken['configById'].pop('Plot!slip')
-    assert sorted(problems(broken)) == ['Plot!other: not placed', 'Plot!slip: no config']
 
 
 def plain(value: Any) -> Any:
@@ -158,14 +118,6 @@ def test_the_places_of_numbers_of_records_are_those_of_their_names(
     assert set(shown) == {'Plot!path'}
 
 
-def test_the_range_of_the_pressures_holds_all_of_them(messages: dict[str, list[Any]]):
-    for name, config in panels('Plot'):
-        if 'pressure' in name:
-            for path in config['paths']:
-                found = values(path['value'], messages)
-                assert config['minYValue'] < min(found) <= max(found) < config['maxYValue']
-
-
 def test_what_is_drawn_is_in_the_bag_and_in_the_fixed_frame(
     bag: BagReader, messages: dict[str, list[Any]]
 ):
@@ -177,16 +129,6 @@ def test_what_is_drawn_is_in_the_bag_and_in_the_fixed_frame(
     frames = {each.header.frame_id for array in messages['/markers'] for each in array.markers}
     frames |= {each.header.frame_id for each in messages['/body/pose']}
     assert frames == {'world'} == {RVIZ['Visualization Manager']['Global Options']['Fixed Frame']}
-
-
-def test_health_is_in_the_bag(bag: BagReader, messages: dict[str, list[Any]]):
-    ((_, summary),) = panels('DiagnosticSummary')
-    assert bag.topics[summary['topicToRender']] == 'diagnostic_msgs/msg/DiagnosticArray'
-    ((_, raw),) = panels('RawMessages')
-    levels = {plain(each.level) for each in values(raw['topicPath'].partition('{')[0], messages)}
-    assert 0 in levels
-    bad = {plain(each.level) for each in values(raw['topicPath'], messages)}
-    assert bad == levels - {0}
 
 
 def test_rviz_shows_topics_of_the_bag(bag: BagReader):

@@ -9,9 +9,7 @@ pytest.importorskip('rclpy')
 
 from sensor_msgs.msg import Imu, JointState
 
-from ros_pad.bags import BagReader
-from ros_pad.errors import ConfigError
-from ros_pad.nodes import topics
+from ros_pad.bags import BagReader, topics
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 
 EXAMPLE = pathlib.Path(__file__).resolve().parents[2] / 'bags' / 'quadruped'
@@ -78,18 +76,4 @@ def test_a_robot_with_faults_through_its_mapping(bench, tmp_path):
         [-0.193, -0.142], abs=0.02
     )
     assert bench.heard(topics.BODY_DOUBT)[-1].data == ''
-    values = {each.key: each.value for each in node._status().values}
-    assert values['forces'] == 'efforts'
-
-
-@pytest.mark.parametrize(
-    ('mapping', 'words'),
-    [
-        ('my', "parameter mapping = 'my' is not allowed: no mapping named 'my'"),
-        ('go2', 'ros2 interface show unitree_go/msg/LowState'),
-    ],
-)
-def test_mappings_that_cannot_be_used(bench, mapping, words):
-    with pytest.raises(ConfigError) as caught:
-        bench.start(BodyEstimatorNode, mapping=mapping, **VALUES)
-    assert words in str(caught.value)
+    assert node.stage.force_source == 'efforts'

@@ -2,25 +2,20 @@
 """Nodes of ros_pad with those of others: drivers by leg, through merge and views."""
 
 import math
+from functools import partial
 
 from helpers import LOAD, fluid, overrides, position, wrench
 from rclpy.node import Node
 
-from ros_pad.bags import topics as schemas
-from ros_pad.nodes import topics
+from ros_pad.bags import topics
+from ros_pad.nodes import qos
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.merge import MergeNode
 from ros_pad.nodes.views import ViewsNode
 
 LEGS = (1, 2)
-WRENCH, POSITION, PRESSURE, SETPOINT, WETNESS = map(
-    topics.of_leg,
-    (
-        schemas.LEG_WRENCH, schemas.LEG_POSITION, schemas.LEG_PRESSURE, schemas.LEG_SETPOINT,
-        schemas.LEG_WETNESS,
-    ),
-)  # fmt: skip
+WRENCH, POSITION, PRESSURE = topics.LEG_WRENCH, topics.LEG_POSITION, topics.LEG_PRESSURE
 
 
 class Driver(Node):
@@ -29,20 +24,17 @@ class Driver(Node):
     def __init__(self, context):
         super().__init__('driver', context=context)
         self.out = {
-            (topic.pattern, leg): self.create_publisher(topic.message, topic.name(leg), 10)
+            (topic.pattern, leg): qos.publisher(self, topic, leg)
             for topic in (WRENCH, POSITION, PRESSURE)
             for leg in LEGS
         }
         self.commanded = {}
         self.wetness = {}
         for leg in LEGS:
-            self.create_subscription(
-                SETPOINT.message, SETPOINT.name(leg), lambda m, leg=leg: self.regulate(leg, m), 1
-            )
-            self.create_subscription(
-                WETNESS.message, WETNESS.name(leg),
-                lambda m, leg=leg: self.wetness.__setitem__(leg, m.data), 1,
-            )  # fmt: skip
+            take = partial(self.regulate, leg)
+            qos.subscription(self, topics.LEG_SETPOINT, take, leg)
+            keep = partial(self.wetness.__setitem__, leg)
+            qos.subscription(self, topics.LEG_WETNESS, lambda m, keep=keep: keep(m.data), leg)
         self.count = 0
 
     def regulate(self, leg, message):
@@ -87,6 +79,6 @@ def test_a_driver_by_leg_walks_with_merge_and_views(context, executor, until):
     until(lambda: len(driver.wetness) == 2, what='estimates by leg')
     assert all(0.0 < each < 1.0 for each in driver.wetness.values())
     assert estimator.stage.used.min() > 0
-    assert merge.refused == {}
+    assert not merge.contested
     for node in nodes.values():
-        assert not node.messages.refusals.counts
+        assert not node.refused

@@ -2,19 +2,17 @@
 """The simulator node: pressure records in, samples of a simulated robot out."""
 
 import math
-import re
-import time
 import types
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import MS, record
+from helpers import MS, nanoseconds, record
 
 from ros_pad import configuration
-from ros_pad.nodes import simulator, topics
+from ros_pad.bags import topics
+from ros_pad.nodes import simulator
 from ros_pad.nodes.simulator import HIGHEST, SimulatorNode
-from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.records import PRESSURE
 
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
@@ -44,14 +42,14 @@ def samples(bench):
 
 
 def test_a_step_is_a_block_of_all_samples_up_to_the_next_control_moment(start, bench):
-    node = start(rate=100.0, fidelity='L1')
-    assert [node.step(END_NS) for _ in range(3)] == [True] * 3
-    assert [each.stamps.tolist() for each in bench.heard(topics.SAMPLE)] == [
-        [10 * MS], [20 * MS], [30 * MS, 40 * MS]
+    node = start(fidelity='L1')
+    assert [node.step(36 * MS) for _ in range(3)] == [True, True, False]  # it ends before one
+    assert [(each.stamps // MS).tolist() for each in bench.heard(topics.SAMPLE)] == [
+        [4], [8, 12, 16, 20], [24, 28, 32, 36]
     ]  # fmt: skip
-    poses = [nanoseconds(each.header.stamp) for each in bench.heard(topics.BODY_POSE)]
-    assert poses == [10 * MS, 20 * MS, 30 * MS, 40 * MS]
-    assert [nanoseconds(each.clock) // MS for each in bench.heard(topics.CLOCK)] == [10, 20, 40]
+    poses = [nanoseconds(each.header.stamp) // MS for each in bench.heard(topics.BODY_POSE)]
+    assert poses == [*range(4, 37, 4)]
+    assert [nanoseconds(each.clock) // MS for each in bench.heard(topics.CLOCK)] == [4, 20, 36]
     rows = bench.heard(topics.SAMPLE)[0].rows[0]
     # The robot, 2.09 kg, stands on six legs; the noise is 0.03 N per leg.
     assert rows['force'][:, 2].sum() == pytest.approx(2.09 * 9.81, abs=0.5)
@@ -63,14 +61,6 @@ def test_a_step_is_a_block_of_all_samples_up_to_the_next_control_moment(start, b
     x, y, _ = rows['position'].T
     assert [leg for leg in range(1, 7) if y[leg - 1] > 0.0] == [1, 2, 3]
     assert [leg for leg in range(1, 7) if x[leg - 1] > 0.1] == [1, 6]
-
-
-def test_a_step_ends_with_the_walk(start, bench):
-    """Samples before a control moment are not answered."""
-    node = start(rate=100.0, fidelity='L1')
-    assert node.step(30 * MS) and node.step(30 * MS)
-    assert not node.step(30 * MS)
-    assert node.time_ns == 30 * MS
 
 
 def test_the_answer_to_the_last_samples_is_told_once(start, bench):
@@ -121,98 +111,43 @@ def test_sensors_of_joints_are_imu_joints_and_forces_in_the_axes_of_the_feet(sta
     assert bench.heard(topics.IMU)[-1].orientation_covariance[0] == -1.0
 
 
-@pytest.mark.realtime
-def test_free_running_keeps_its_rate_and_the_time_of_day(bench):
-    bench.start(SimulatorNode, **REAL, rate=100.0)
-    # What the first steps take is caught up before.
-    bench.until(lambda: bench.sent['/feet/sample'] and len(samples(bench)[0]) > 50)
-    first, count = time.monotonic(), len(samples(bench)[0])
-    bench.until(lambda: time.monotonic() > first + 1.0)
-    stamps, _ = samples(bench)
-    assert 90 <= len(stamps) - count <= 103
-    assert abs(stamps[-1] * MS - time.time_ns()) < 200 * MS
-    assert not bench.sent['/clock']
-
-
-@pytest.mark.realtime
-def test_a_simulator_that_keeps_up_reports_that(bench):
-    bench.start(SimulatorNode, **REAL, scene='leg_wet_dome_40', fidelity='L0', rate=50.0)
-    bench.until(lambda: len(bench.statuses('rate')) >= 2)
-    _, status = bench.statuses('rate')[-1]
-    assert status.level == OK
-    assert status.message.endswith('of 50 samples a second')
-    assert figures(status) == pytest.approx([50.0, 50.0, 1.0], rel=0.05)
+def test_the_rate_is_measured_from_the_first_tick(bench, monkeypatch, capfd):
+    """A start that takes long is no reason to warn; the time here is not that of the machine."""
+    node = bench.start(SimulatorNode, **REAL, scene='leg_wet_dome_40', fidelity='L0')
+    timer, reports = (each.callback for each in node.timers)
+    now = 10**12
+    monkeypatch.setattr(simulator, 'time', types.SimpleNamespace(monotonic_ns=lambda: now))
+    reports()
+    assert not bench.statuses('rate')
+    timer()
+    assert node.robot.time == 0.0
+    # Twenty-five samples at a time are caught up with; of fifty, the others are left out.
+    for step_ms, end in ((20, 1.0), (100, 2.0), (200, 2.5)):
+        for _ in range(1000 // step_ms):
+            now += step_ms * MS
+            timer()
+        assert node.robot.time == pytest.approx(end)
+        reports()
+    statuses = [status for _, status in bench.statuses('rate')]
+    assert [figures(each) for each in statuses] == [
+        [250.0, 250.0, 1.0], [250.0, 250.0, 1.0], [250.0, 125.0, 0.5]
+    ]  # fmt: skip
+    assert [each.level for each in statuses] == [OK, OK, WARN]
+    assert statuses[0].message == '250 of 250 samples a second'
+    assert capfd.readouterr().err.count('too slow: 125 of 250 samples a second') == 1
+    bench.legs = (1,)
+    assert len(samples(bench)[0]) == 625
 
 
 def figures(status):
     return [float(each.value) for each in status.values]
 
 
-def test_a_simulator_that_is_too_slow_reports_its_rate(bench, monkeypatch, capfd):
-    """A step of 40 ms at 100 Hz: time is left out, and no sample."""
-    node = bench.start(SimulatorNode, **REAL, scene='leg_wet_dome_40', fidelity='L0', rate=100.0)
-    step = node.robot.step
-    monkeypatch.setattr(node.robot, 'step', lambda given: time.sleep(0.04) or step(given))
-    bench.until(lambda: len(bench.statuses('rate')) >= 4)  # not so slow in the first two seconds
-    at, status = bench.statuses('rate')[-1]
-    assert status.level == WARN
-    assert [each.key for each in status.values] == [
-        'wanted rate (Hz)', 'reached rate (Hz)', 'speed (times real time)',
-    ]  # fmt: skip
-    wanted, reached, speed = figures(status)
-    assert wanted == 100.0
-    assert 0.0 < reached <= 27.0
-    assert 0.0 < speed <= 0.27
-    assert re.match(r'too slow: \d+ of 100 samples a second: choose ', status.message)
-    assert 'too slow: ' in capfd.readouterr().err
-    assert abs(at - time.time()) < 60.0
-    # Stamps are those of the time of day, so that other nodes do not take readings for old ones.
-    bench.legs = (1,)
-    stamps, _ = samples(bench)
-    assert np.diff(stamps).min() > 5.0
-    assert abs(stamps[-1] * 1e-3 - time.time()) < 60.0
-
-
-def test_the_rate_is_measured_over_whole_seconds_from_the_first_tick(bench, monkeypatch, capfd):
-    """A start that takes long is no reason to warn; the time here is not that of the machine."""
-    node = bench.start(SimulatorNode, **REAL, scene='leg_wet_dome_40', fidelity='L0', rate=100.0)
-    (timer,) = node.timers
-    now = 10**12
-
-    def tick_until(end_ms, step_ms):
-        nonlocal now
-        for _ in range(round((end_ms - (now - 10**12) / 1e6) / step_ms)):
-            now += step_ms * 1_000_000
-            timer.callback()
-
-    monkeypatch.setattr(simulator, 'time', types.SimpleNamespace(monotonic_ns=lambda: now))
-    timer.callback()
-    assert node.robot.time == 0.0
-    tick_until(2000, 10)
-    assert node.robot.time == pytest.approx(2.0)
-    tick_until(3000, 50)  # five samples at a time
-    assert node.robot.time == pytest.approx(3.0)
-    tick_until(4000, 200)  # ten of twenty: the others are left out, and so is their time
-    assert node.robot.time == pytest.approx(3.5)
-    statuses = [status for _, status in bench.statuses('rate')]
-    assert [figures(each) for each in statuses] == 3 * [[100.0, 100.0, 1.0]] + [[100.0, 50.0, 0.5]]
-    assert [each.level for each in statuses] == 3 * [OK] + [WARN]
-    assert statuses[0].message == '100 of 100 samples a second'
-    assert capfd.readouterr().err.count('too slow: 50 of 100 samples a second') == 1
-    bench.legs = (1,)
-    assert len(samples(bench)[0]) == 350
-
-
-def test_without_real_time_there_is_no_rate(start, bench):
-    start().step(END_NS)
-    assert '/diagnostics' not in bench.sent
-
-
 def test_it_does_not_wait_for_its_own_clock(bench):
-    bench.start(SimulatorNode, use_sim_time=True, rate=100.0, publish_clock=True)
+    bench.start(SimulatorNode, use_sim_time=True, publish_clock=True)
     bench.until(lambda: len(bench.sent['/clock']) > 5)
     stamps = np.array([nanoseconds(each.clock) for each in bench.heard(topics.CLOCK)])
-    assert (np.diff(stamps) > 0).all() and not (stamps % (10 * MS)).any()
+    assert (np.diff(stamps) > 0).all() and not (stamps % (4 * MS)).any()
 
 
 def test_it_reports_the_fidelity_level_and_the_end_of_the_walk(bench, tmp_path, capfd):
@@ -226,13 +161,6 @@ def test_it_reports_the_fidelity_level_and_the_end_of_the_walk(bench, tmp_path, 
     log = capfd.readouterr().err
     assert 'top_heavy on L1: ' in log
     assert log.count('tip-over at') == 1
-
-
-def test_the_scene_gives_rate_and_legs(start, bench):
-    node = start(scene='leg_wet_flat')
-    assert node.period_ns == 4 * MS  # 250 Hz
-    node.step(END_NS)
-    assert bench.last(topics.SAMPLE).shape == (1,)
 
 
 def test_domes_walk_further_on_wet_ground(start, bench):
@@ -260,13 +188,6 @@ def test_a_pressure_that_is_none_changes_nothing(start, bench):
         taken.append(node.pressures[0])
     # Values that are not finite are ignored; slightly below ambient counts as zero.
     assert taken == [50e3] * 5 + [0.0]
-
-
-def test_a_missing_row_concerns_its_leg_only(start, bench):
-    node = start(fidelity='L1')
-    bench.give(topics.PRESSURE, record(PRESSURE, 1, 6, pressure=10e3))
-    bench.give(topics.PRESSURE, record(PRESSURE, 2, 6, pressure=[math.nan] + [20e3] * 5))
-    assert node.pressures == [10e3] + [20e3] * 5
 
 
 def test_the_same_seed_is_the_same_walk(start, bench):

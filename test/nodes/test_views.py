@@ -4,15 +4,13 @@
 import math
 
 import pytest
-from helpers import AMBIENT, LOAD, MS, encoded, estimate, overrides, record
+from helpers import AMBIENT, LOAD, MS, encoded, estimate, nanoseconds, overrides, record
 from rclpy.node import Node
 from visualization_msgs.msg import Marker
 
-from ros_pad.bags import topics as schemas
-from ros_pad.errors import ConfigError
+from ros_pad.bags import topics
 from ros_pad.estimation import doubt as doubts
-from ros_pad.nodes import topics
-from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes import qos
 from ros_pad.nodes.views import SHOWN, ViewsNode
 from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE
 
@@ -60,7 +58,7 @@ def test_each_topic_of_a_leg_carries_the_numbers_of_the_record(bench, schema):
     bench.start(ViewsNode, topics=schema.kind)
     give_all(bench)
     for leg, numbers in enumerate(CARRIED[schema.kind], 1):
-        heard = bench.heard(topics.of_leg(schema), leg)
+        heard = bench.heard(schema, leg)
         if numbers is None:
             assert heard == []
             continue
@@ -72,26 +70,6 @@ def test_each_topic_of_a_leg_carries_the_numbers_of_the_record(bench, schema):
     assert {name for name in bench.sent if name.startswith('/leg')} <= {
         f'/{schema.name(leg)}' for leg in (1, 2)
     }
-
-
-def test_set_points_are_absolute_by_the_ambient_pressure_of_the_parameter(bench):
-    bench.start(ViewsNode, ambient_pressure=85000.0)
-    give_all(bench)
-    (message,) = bench.heard(topics.of_leg(schemas.LEG_SETPOINT), 1)
-    assert message.fluid_pressure == 155e3
-
-
-def test_every_record_of_a_block_is_shown(bench):
-    bench.start(ViewsNode)
-    rows = SAMPLE.rows(3, 2)
-    rows['force'] = 1.0
-    block = record(SAMPLE, 0)._replace(
-        stamps=4 * MS * record(SAMPLE, 1).stamps.repeat(3), rows=rows
-    )
-    block.stamps[:] = [4 * MS, 8 * MS, 12 * MS]
-    bench.give(topics.SAMPLE, block)
-    heard = bench.heard(topics.of_leg(schemas.LEG_WRENCH), 2)
-    assert [nanoseconds(each.header.stamp) for each in heard] == block.stamps.tolist()
 
 
 def test_texts_are_published_when_they_change(bench):
@@ -106,13 +84,13 @@ def test_texts_are_published_when_they_change(bench):
         bench.give(topics.COMMAND, record(COMMAND, place, dome=[dome, NAN]))
 
     def said(schema, leg):
-        return [each.data for each in bench.heard(topics.of_leg(schema), leg)]
+        return [each.data for each in bench.heard(schema, leg)]
 
     text = doubts.text(doubts.LOST, 0.2)
-    assert said(schemas.LEG_DOUBT, 1) == [text, '', text]
-    assert said(schemas.LEG_DOUBT, 2) == ['']
-    assert said(schemas.LEG_MORPHOLOGY, 1) == ['flat', 'dome', 'flat']
-    assert said(schemas.LEG_MORPHOLOGY, 2) == []
+    assert said(topics.LEG_DOUBT, 1) == [text, '', text]
+    assert said(topics.LEG_DOUBT, 2) == ['']
+    assert said(topics.LEG_MORPHOLOGY, 1) == ['flat', 'dome', 'flat']
+    assert said(topics.LEG_MORPHOLOGY, 2) == []
 
 
 def test_texts_reach_who_comes_late(context, executor, until):
@@ -123,7 +101,7 @@ def test_texts_reach_who_comes_late(context, executor, until):
         executor.add_node(node)
     (take,) = [each.callback for each in views.subscriptions if 'command' in each.topic_name]
     take(encoded(topics.COMMAND, record(COMMAND, 1, 1, dome=1.0), (1,)))
-    topics.of_leg(schemas.LEG_MORPHOLOGY).subscription(late, heard.append, 1)
+    qos.subscription(late, topics.LEG_MORPHOLOGY, heard.append, 1)
     until(lambda: heard, what='the latched morphology')
     assert [each.data for each in heard] == ['dome']
 
@@ -151,8 +129,3 @@ def test_markers_show_the_feet_in_colours_of_their_wetness(bench):
     assert (yellow.pose.position.x, yellow.pose.position.y) == (0.3, 0.4)  # the last known place
     grey = arrays[-1].markers[0].color
     assert grey.r == grey.g == grey.b
-
-
-def test_a_topic_that_is_none_of_a_leg_is_refused(bench):
-    with pytest.raises(ConfigError, match="'wetnes' is no topic of a leg: some of wrench, posit"):
-        bench.start(ViewsNode, topics='slip, wetnes')

@@ -4,36 +4,35 @@
 import dataclasses
 import json
 import math
-import pathlib
 import xml.etree.ElementTree
 
 import pytest
 
 from ros_pad import cli
 from ros_pad.contact import Film, Foot, MeasuredLimit, Pad, force_limit, tangential_resistance
-from ros_pad.reports.explore import FIELDS, STATES, Explored, Field, Inputs, explore, rows
+from ros_pad.reports.explore import FIELDS, STATES, explore, inputs_of, rows
 from ros_pad.reports.explore_drawings import drawings, svg
 from ros_pad.reports.explore_page import foot_file
 from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel, Scene
 from ros_pad.simulation.pneumatics import time_to
 
-LARGE = Inputs.of(Foot.load('large37'))
+LARGE = inputs_of(Foot.load('large37'))
 
 
-def changed(**values: object) -> Explored:
-    return explore(dataclasses.replace(LARGE, **values))
+def changed(**values):
+    return explore(LARGE | values)
 
 
-def picture(found: Explored) -> str:
+def picture(found):
     return f'<div>{"".join(map(svg, drawings(found).values()))}</div>'
 
 
-def texts(found: Explored) -> dict[str, str]:
-    return {row.key: row.text for _, group in rows(found) for row in group}
+def texts(found):
+    return {key: text for group in rows(found).values() for key, (_, text) in group.items()}
 
 
-def test_the_numbers_are_those_of_pad_contact(capsys: pytest.CaptureFixture[str]):
-    force = str(LARGE.load / 37)
+def test_the_numbers_are_those_of_pad_contact(capsys):
+    force = str(LARGE['load'] / 37)
     options = ('--foot', 'large37', '--pressure', '76500', '--force', force, '--json')
     assert cli.main(['contact', *options]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -50,7 +49,7 @@ def test_the_numbers_are_those_of_pad_contact(capsys: pytest.CaptureFixture[str]
 
 
 @pytest.mark.parametrize('roughness', [0.0, 2e-6])
-def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
+def test_grip_is_that_of_the_foot_on_its_film(roughness):
     found = changed(roughness=roughness, load=13.0)
     foot = Foot.load('large37').on_rough(roughness)
     for state in STATES:
@@ -69,23 +68,23 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
 
 def test_film_time_and_hose_are_those_of_the_scene():
     scene = Scene.load('hexapod_patches')
-    assert scene.floor.film_thickness == LARGE.film
-    assert scene.regulator == {'hose_diameter': LARGE.bore, 'hose_length': LARGE.hose}
-    assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE.stand
+    assert scene.floor.film_thickness == LARGE['film']
+    assert scene.regulator == {'hose_diameter': LARGE['bore'], 'hose_length': LARGE['hose']}
+    assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE['stand']
 
 
 def test_a_measured_limit_stays_with_its_pad():
     pad = Pad(1.6e-3, 45.0, measured_limit=MeasuredLimit(0.3, 70e3, 5e-6))
-    foot = dataclasses.replace(LARGE.foot, pad=pad, limit='measured')
-    own = explore(Inputs.of(foot))
-    assert own.limits['measured'] == force_limit(pad, own.inputs.pressure, 'measured')
+    foot = dataclasses.replace(LARGE['foot'], pad=pad, limit='measured')
+    own = explore(inputs_of(foot))
+    assert own.limits['measured'] == force_limit(pad, own.inputs['pressure'], 'measured')
     for other in ({'radius': 1.7e-3}, {'stiffness': 46.0}):
-        assert 'measured' not in explore(dataclasses.replace(own.inputs, **other)).limits
+        assert 'measured' not in explore(own.inputs | other).limits
 
 
 def test_switching_is_that_of_the_channel():
     found = changed(bore=1e-3, hose=5.0)
-    channel = PneumaticChannel(RegulatorModel(), Hose(1e-3, 5.0), LARGE.foot.air_volume)
+    channel = PneumaticChannel(RegulatorModel(), Hose(1e-3, 5.0), LARGE['foot'].air_volume)
     assert found.switching.fill == pytest.approx(
         time_to(channel, 76500.0, 0.9 * 76500.0), rel=0.01
     )
@@ -99,7 +98,7 @@ def test_switching_is_that_of_the_channel():
 
 # The input that is marked, words there, and the numbers that go; all others stay.
 PRESSED = {'pressed-gap', 'pressed-contact_radius', 'ring-height'}
-LIMITS = {f'limit-{name}' for name in ('thickness', 'wall', 'flattening', 'max_depth', 'measured')}
+LIMITS = {f'limit-{name}' for name in ('thickness', 'flattening', 'measured')}
 GRIP = {f'grip-{state.replace(", ", "-")}' for state in STATES}
 DOMED = {key for key in GRIP if 'dome' in key}
 FOOT = {'limit', 'fill', 'vent'}
@@ -109,10 +108,7 @@ BAD = [
     ({'pressure': 95e3}, 'pressure', 'ceiling of the foot', {'all'}),
     ({'pressure': 0.0}, 'pressure', 'more pressure is needed', PRESSED | DOMED | {'fill', 'vent'}),
     ({'pads': 600}, 'pads', 'at most 128', PRESSED | GRIP | FOOT | {'pitch'}),
-    ({'pads': 3.5}, 'pads', 'a whole number', PRESSED | GRIP | FOOT | {'pitch'}),
-    ({'thickness': 2e-3}, 'thickness', 'up to 0.0015 m', {'all'}),
     ({'film': 2.0}, 'film', 'from 0.001 to 10 mm', {'grip-flat-wet', 'grip-dome-wet'}),
-    ({'roughness': -1.0}, 'roughness', 'from 0 to 1000 µm', GRIP),
     ({'bore': 1e-9}, 'bore', 'from 0.5 to 20 mm', {'fill', 'vent'}),
     ({'supply': 1.0}, 'supply', 'from 1 to 1000 kPa', GRIP | FOOT),
     ({'material': 'nix'}, 'material', "no material named 'nix'", {'all'}),
@@ -120,7 +116,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(('values', 'name', 'words', 'gone'), BAD)
-def test_where_a_model_ends_the_rest_stays(values: dict, name: str, words: str, gone: set[str]):
+def test_where_a_model_ends_the_rest_stays(values, name, words, gone):
     found = changed(**values)
     (error,) = (each for each in found.remarks if each.error)
     assert error.name == name
@@ -142,7 +138,7 @@ def test_a_foot_that_no_file_may_have_is_refused():
     assert found.foot is None and found.free is not None
 
 
-def notes(**values: object) -> dict[str, str]:
+def notes(**values):
     found = changed(**values)
     assert not any(each.error for each in found.remarks)
     assert {key for key, text in texts(found).items() if text == '–'} == {'ring-height'}
@@ -150,14 +146,14 @@ def notes(**values: object) -> dict[str, str]:
 
 
 def test_what_is_worth_knowing_is_no_error():
-    assert 'ends at 91.34 kPa' in notes(supply=150e3, criterion='wall')['supply']
+    assert 'ends at 91.34 kPa' in notes(supply=150e3, criterion='flattening')['supply']
     assert 'thickness is used' in notes(radius=1.4e-3)['criterion']
     assert 'pads overlap' in notes(pads=120)['pads']
     assert 'domes touch one another' in notes(pads=91)['pads']
 
 
 @pytest.mark.parametrize('field', FIELDS, ids=[field.name for field in FIELDS])
-def test_the_values_of_every_slider_are_drawn(field: Field):
+def test_the_values_of_every_slider_are_drawn(field):
     for end in (field.low, field.high):
         value = int(end) if field.name == 'pads' else end * field.unit
         drawn = xml.etree.ElementTree.fromstring(picture(changed(**{field.name: value})))
@@ -166,15 +162,15 @@ def test_the_values_of_every_slider_are_drawn(field: Field):
 
 
 @pytest.mark.parametrize('name', ['large37', 'large19', 'small217'])
-def test_the_foot_file_gives_the_foot(name: str, tmp_path: pathlib.Path):
+def test_the_foot_file_gives_the_foot(name, tmp_path):
     start = dataclasses.replace(Foot.load(name), capillary_force=1.5e-4)
-    inputs = dataclasses.replace(Inputs.of(start), pads=31, sole_radius=16e-3)
+    inputs = inputs_of(start) | {'pads': 31, 'sole_radius': 16e-3}
     path = tmp_path / 'foot.yaml'
     path.write_text(foot_file(explore(inputs).foot), encoding='utf-8')
     again = Foot.load(path)
     wanted = dataclasses.replace(start, source=str(path), pads=31, sole_radius=16e-3)
     assert again == wanted
-    other = dataclasses.replace(inputs, radius=0.7e-3, thickness=0.15e-3, criterion='flattening')
-    found = explore(other).foot
+    other = {'radius': 0.7e-3, 'thickness': 0.15e-3, 'criterion': 'flattening'}
+    found = explore(inputs | other).foot
     path.write_text(foot_file(found), encoding='utf-8')
     assert Foot.load(path) == dataclasses.replace(found, source=str(path))

@@ -112,13 +112,6 @@ def test_out_of_reach():
         FeetSolver(robot).angles(places.tolist())
 
 
-def test_a_place_on_the_axis_of_the_hip_is_out_of_reach():
-    robot = Robot.load('go2')
-    leg = LegSolver(robot.chains.legs[0], robot.chains.feet[0], robot.home[0].tolist())
-    with pytest.raises(InvalidInput, match=r'at least 0\.0955 m is needed'):
-        leg.angles(*robot.hips[0].tolist())
-
-
 def test_other_legs_take_newtons_method():
     robot = Robot.load(URDF, feet=['a_foot', 'b_foot', 'c_foot'])
     legs = zip(robot.chains.legs, robot.chains.feet, strict=True)

@@ -27,38 +27,9 @@ def odd() -> Robot:
     return Robot.load(URDF, feet=FEET, imu='imu', foot_radius=0.02)
 
 
-def pinocchio_figures() -> dict[str, object]:
-    """Compute the same robot with pinocchio: ``python test/robots/test_robot.py`` keeps it."""
-    pin = pytest.importorskip('pinocchio')
-    model = pin.buildModelFromUrdf(str(URDF))
-    model.gravity.linear[:] = GRAVITY
-    data = model.createData()
-    q = pin.neutral(model)
-    columns = []
-    for name, angle in zip(odd().joint_names, Q.ravel(), strict=True):
-        joint = model.joints[model.getJointId(name)]
-        turned = (np.cos(angle), np.sin(angle)) if joint.nq == 2 else (angle,)
-        q[joint.idx_q : joint.idx_q + joint.nq] = turned
-        columns.append(joint.idx_v)
-    torques = pin.computeGeneralizedGravity(model, data, q)[columns].reshape(3, 3)
-    source = f'pinocchio {pin.__version__} on robot.urdf, with Q and GRAVITY of test_robot.py'
-    found: dict[str, object] = {'source': source, 'torques': torques.tolist()}
-    for leg, foot in enumerate(FEET):
-        frame = model.getFrameId(foot)
-        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        lines = pin.computeFrameJacobian(model, data, q, frame, axes)
-        pin.framesForwardKinematics(model, data, q)
-        found[foot] = {
-            'position': data.oMf[frame].translation.tolist(),
-            'rotation': data.oMf[frame].rotation.tolist(),
-            'jacobian': lines[:, columns[3 * leg : 3 * leg + 3]].tolist(),
-        }
-    found['imu'] = data.oMf[model.getFrameId('imu')].homogeneous.tolist()
-    return found
-
-
-def assert_kinematics(figures: dict) -> None:
+def test_kinematics_are_those_that_pinocchio_gave():
     robot = odd()
+    figures = json.loads((REFERENCE / 'robot_pinocchio.json').read_text())
     for leg, foot in enumerate(FEET):
         row = figures[foot]
         assert robot.foot_positions(Q)[leg] == pytest.approx(np.array(row['position']), abs=1e-12)
@@ -69,25 +40,6 @@ def assert_kinematics(figures: dict) -> None:
     torques = robot.gravity_torques(Q, GRAVITY)
     assert torques == pytest.approx(np.array(figures['torques']), abs=1e-12)
     assert robot.imu == pytest.approx(np.array(figures['imu']), abs=1e-12)
-
-
-def test_kinematics_are_those_that_pinocchio_gave():
-    assert_kinematics(json.loads((REFERENCE / 'robot_pinocchio.json').read_text()))
-
-
-def test_kinematics_are_those_of_pinocchio_now():
-    assert_kinematics(pinocchio_figures())
-
-
-def test_a_urdf_has_names_and_masses():
-    robot = odd()
-    assert robot.name == 'odd'
-    assert robot.legs == tuple(FEET)
-    assert robot.joint_names == (
-        *('a_j1', 'a_j2', 'a_j3'), *('b_j1', 'b_j2', 'b_j3'), *('c_j1', 'c_j2', 'c_j3'),
-    )  # fmt: skip
-    assert robot.mass == pytest.approx(5.0 + 0.7 + 0.4 + 0.3 + 0.05 + 0.6 + 0.2 + 0.3)
-    assert robot.foot_radius == 0.02
 
 
 @pytest.mark.parametrize('name', ['go2', 'ch3r'])
@@ -171,41 +123,15 @@ def test_gaits_by_phase():
 
 
 @pytest.mark.parametrize(
-    ('name', 'legs', 'duty', 'message'),
-    [
-        ('gallop', 4, 0.6, 'one of tripod'),
-        ('trot', 6, 0.6, '4 legs'),
-        ('crawl', 4, 0.6, 'at least 0.75'),
-        ('wave', 5, 0.99, 'duty'),
-    ],
-)
-def test_gaits_that_are_not_allowed(name, legs, duty, message):
-    angles = np.linspace(0.1, 6.0, legs)
-    with pytest.raises(InvalidInput, match=message):
-        Gait.named(name, np.stack([np.cos(angles), np.sin(angles)], 1), 0.6, duty, 0.03)
-
-
-@pytest.mark.parametrize(
     ('old', 'new', 'message'),
     [
         ('mass: 15.02', 'mass: 3.0', 'mass = 3 kg is not allowed: at least 8.096 kg is needed'),
-        ('mass: 15.02', 'mas: 15.02', "key 'mass' is missing"),
         ('[0.0, 0.0, -0.213]\n\ngait', '[0.0, -0.213]\n\ngait', 'a list of 3 numbers'),
         ('axis: [1.0, 0.0, 0.0]', 'axis: [0.0, 0.0, 0.0]', 'no direction'),
         ('kind: trot', 'kind: tripod', '6 or 8 legs'),
-        ('side: right', 'side: top', 'one of left, right'),
-        (
-            '  RR: {at: [-0.1934, -0.0465, 0.0], side: right}\n',
-            '  true: {at: [0, 0, 0]}\n',
-            'True',
-        ),
-        ('home: 0.9', 'hom: 0.9', "unknown key 'hom'"),
         ('at: [0.0, 0.0, -0.213]', 'at: [0.0, 0.0, -213.0]', r'-213.0 .* -5 to 5 m \(not mm\)'),
         ('foot: [0.0, 0.0, -0.213]', 'foot: [0.0, 0.0, -4.9]', r'leg FL: length = 5\.2.* 5 m'),
-        ('at: [0.1934, 0.0465, 0.0]', 'at: [4.9, 4.9, 0]', 'hip from the base = 6.9'),
-        ('at: [-0.02557, 0.0, 0.04232]', 'at: [-25.57, 0.0, 42.32]', 'at = -25.57 .* m'),
         ('mass: 15.02', 'mass: 15020.0', r'mass = 15020.0 .* 2000 kg \(not g\)'),
-        ('mass: 0.678', 'mass: -0.678', 'mass = -0.678'),
         ('foot_radius: 0.022', 'foot_radius: 0.9', 'foot_radius = 0.9 .* 0 to 0.52'),
         ('{axis: [1.0', '{kind: prismatic, axis: [1.0', 'servo is not allowed: .* FL_hip_joint'),
     ],
@@ -236,8 +162,6 @@ def test_an_own_gait_and_fewer_legs(tmp_path):
     ('old', 'new', 'message'),
     [
         ('<robot name="odd">', '<robot name="odd"', 'not a readable URDF'),
-        ('<robot', '<model', 'not a readable URDF'),
-        ('"continuous"', '"floating"', "type = 'floating'"),
         ('<axis xyz="1 2 -1"/>', '<axis xyz="0 0 0"/>', 'no direction'),
         ('<axis xyz="1 2 -1"/>', '<axis xyz="1 2 nan"/>', 'finite'),
         ('<child link="a1"/>', '<child link="none"/>', "'none'"),
@@ -248,7 +172,6 @@ def test_an_own_gait_and_fewer_legs(tmp_path):
         ('name="imu_joint" type="fixed"', 'name="imu_joint" type="revolute"', 'moves'),
         ('<limit lower="-3" upper="3"', '<limit lower="3" upper="-3"', 'lower = 3 .* at most'),
         ('<axis xyz="1 2 -1"/>', '<axis xyz="1 2 -1"/><mimic joint="b_j1"/>', 'mimic .*b_j1'),
-        ('<mass value="0.7"/>', '<mass value="7000"/>', r'mass = 700\d.* 2000 kg'),
     ],
 )  # fmt: skip
 def test_urdf_files_that_are_not_valid(old, new, message, tmp_path):
@@ -285,13 +208,6 @@ def test_legs_that_share_a_joint_are_refused(tmp_path):
     path.write_text(URDF.read_text().replace('"b_j1"', '"a_j1"'))
     with pytest.raises(ConfigError, match="'a_j1' is in two legs"):
         Robot.load(path, feet=FEET)
-
-
-def test_a_home_of_joints_that_are_not_there(tmp_path):
-    path = tmp_path / 'odd.yaml'
-    path.write_text(f'urdf: {URDF}\nfeet: {FEET}\nhome: {{knee: 1, 5: 2}}\n')
-    with pytest.raises(ConfigError, match="no joint ends in 'knee'"):
-        Robot.load(path)
 
 
 @pytest.mark.parametrize(
@@ -334,15 +250,6 @@ def test_lengths_of_a_urdf_in_millimetres(tmp_path):
         Robot.load(path, feet=FEET)
 
 
-def test_names_and_links_that_are_not_there():
-    with pytest.raises(ConfigError, match='There are: ch3r, go2'):
-        Robot.load('go3')
-    with pytest.raises(ConfigError, match="no link 'd_foot'"):
-        Robot.load(URDF, feet=[*FEET, 'd_foot'])
-    with pytest.raises(InvalidInput, match='for URDF'):
-        Robot.load('go2', imu='imu')
-
-
 @pytest.mark.parametrize('q', [np.zeros(11), np.full(12, np.nan), np.zeros((4, 4)), 'zero'])
 def test_joint_positions_that_are_not_allowed(q):
     with pytest.raises(InvalidInput, match='q'):
@@ -358,11 +265,6 @@ def test_rotations_and_quaternions(angles):
     assert from_rpy(angles) == pytest.approx(scipy.from_euler('xyz', angles).as_matrix(), abs=1e-9)
     kept = scipy.from_quat(quaternion(made)).as_matrix()
     assert kept == pytest.approx(made, abs=1e-9)
-
-
-if __name__ == '__main__':
-    text = json.dumps(pinocchio_figures(), indent=1)
-    (REFERENCE / 'robot_pinocchio.json').write_text(text + '\n')
 
 
 @pytest.mark.parametrize('name', ['go2', 'ch3r'])

@@ -11,7 +11,6 @@ from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import from_rpy, transform
 from ros_pad.sensing import BodyEstimator
-from ros_pad.sensing.plausibility import Shift
 
 DT = 0.004
 UP = np.array((0.0, 0.0, 9.81))
@@ -98,7 +97,7 @@ def test_velocity_and_path_of_a_body_over_feet_that_stick(noise):
     assert np.linalg.eigvalsh(found.covariance).min() > -1e-12
 
 
-@pytest.mark.parametrize('feet', [[0], [0, 2], [1, 2, 3]])
+@pytest.mark.parametrize('feet', [[0], [1, 2, 3]])
 def test_slips_are_found_and_do_not_drag_the_body_along(feet):
     motion = Motion(noise=1.0)
     for _ in range(250):
@@ -171,17 +170,6 @@ def test_a_lifted_body_is_in_doubt_and_its_deviation_grows():
     assert found.doubt == ''
 
 
-def test_start_in_motion_is_in_doubt_and_then_found():
-    motion = Motion(noise=1.0)
-    motion.velocity = np.array((0.2, 0.0, 0.0))
-    first = motion.step((0.2, 0.0, 0.0))
-    assert first.doubt.startswith('start: ')
-    for _ in range(100):
-        found = motion.step((0.2, 0.0, 0.0))
-    assert found.doubt == ''
-    assert found.velocity == pytest.approx([0.2, 0.0, 0.0], abs=0.015)
-
-
 def test_a_robot_on_a_slope_knows_it():
     tilt = from_rpy((0.1, -0.2, 0.0))
     estimator = BodyEstimator(POINTED)
@@ -237,15 +225,6 @@ def test_without_forces_there_is_a_doubt():
     assert not any(foot.in_contact for foot in found.feet)
 
 
-def test_an_accelerometer_without_gravity_is_in_doubt():
-    q = POINTED.home.ravel()
-    estimator = BodyEstimator(POINTED)
-    for tick in range(250):
-        found = estimator.update(tick * DT, np.zeros(3), np.zeros(3), q, 0.0 * q, STANDING)
-        assert np.isfinite(found.velocity).all()
-    assert found.doubt.startswith('gravity: ')
-
-
 def test_gaps_and_clocks_that_go_back():
     motion = Motion()
     for _ in range(100):
@@ -273,13 +252,9 @@ def test_gaps_and_clocks_that_go_back():
         (0, math.nan, 'time'),
         (1, [0.0, math.nan, 0.0], 'gyro = nan'),
         (2, [0.0, 0.0], 'accelerometer of shape'),
-        (2, [0.0, 0.0, math.inf], 'accelerometer = inf'),
         (3, np.zeros(11), 'joint_positions of shape'),
         (4, np.full(12, math.nan), 'joint_velocities = nan'),
-        (4, 'fast', 'joint_velocities'),
         (5, np.zeros((3, 3)), 'foot_forces of shape'),
-        (5, np.full((4, 3), 1e9), 'foot_forces'),
-        (6, np.zeros(3), 'efforts of shape'),
     ],
 )
 def test_bad_readings_are_refused_and_change_nothing(index, value, message):
@@ -303,17 +278,10 @@ def test_bad_readings_are_refused_and_change_nothing(index, value, message):
     ('arguments', 'message'),
     [
         ({'gyro_noise': 0.0}, 'gyro_noise'),
-        ({'accelerometer_noise': math.nan}, 'accelerometer_noise'),
-        ({'encoder_noise': -1.0}, 'encoder_noise'),
-        ({'velocity_noise': 0.0}, 'velocity_noise'),
-        ({'force_noise': -0.1}, 'force_noise'),
-        ({'contact_share': 2.0}, 'contact_share'),
+        ({'encoder_noise': math.nan}, 'encoder_noise'),
         ({'rate': 1.0}, 'rate'),
         ({'window': 2.0}, 'window'),
         ({'force_axes': 'world'}, 'force_axes'),
-        ({'radius_error': -0.1}, 'radius_error'),
-        ({'length_error': 0.6}, 'length_error'),
-        ({'joint_delay': 0.1}, 'joint_delay'),
     ],
 )
 def test_arguments_that_are_not_allowed(arguments, message):
@@ -340,31 +308,6 @@ def test_wild_readings_never_give_nan():
             assert np.isfinite([*foot.slip_velocity, foot.slip_velocity_sd, *foot.force]).all()
 
 
-def test_the_same_readings_give_the_same_estimates():
-    found = []
-    for _ in range(2):
-        motion = Motion(noise=1.0, seed=5)
-        found.append([motion.step(speed_at(tick * DT)).velocity for tick in range(100)])
-    assert np.array_equal(found[0], found[1])
-
-
-def test_lists_do_and_ragged_lists_are_refused():
-    q = POINTED.home.ravel()
-    readings = ([0, 0, 0], [0, 0, 9.81], q.tolist(), [0] * 12, STANDING.tolist())
-    found = BodyEstimator(POINTED).update(0, *readings)
-    other = BodyEstimator(POINTED).update(0.0, *map(np.array, readings))
-    assert np.array_equal(found.position, other.position)
-    with pytest.raises(InvalidInput, match='foot_forces'):
-        BodyEstimator(POINTED).update(0.0, *readings[:4], [[1.0], [1.0, 2.0]])
-
-
-def test_motion_without_noise_and_forces_from_contacts_leave_no_doubt():
-    motion = Motion()
-    motion.velocity = np.array((0.2, 0.0, 0.0))
-    found = [motion.step((0.2, 0.0, 0.0)) for _ in range(200)]
-    assert {each.doubt for each in found[100:]} == {''}
-
-
 def test_joints_whose_velocity_is_not_theirs_are_named():
     estimator = BodyEstimator(POINTED)
     q = POINTED.home.ravel()
@@ -381,15 +324,6 @@ def test_joints_whose_velocity_is_not_theirs_are_named():
     assert found.doubt == 'joints: the position of RL_thigh_joint does not follow its velocity'
 
 
-def test_readings_wait_for_joints_that_are_late():
-    shift = Shift(0.006)
-    ticks = [DT * tick for tick in range(20)]
-    found = [shift.update(time, [np.array((time, 2.0 * time))]) for time in ticks]
-    for time, (values,) in list(zip(ticks, found, strict=True))[5:]:
-        assert values == pytest.approx([time - 0.006, 2.0 * (time - 0.006)])
-    assert shift.update(-1.0, [np.zeros(2)])[0] == pytest.approx(np.zeros(2))
-
-
 @pytest.mark.parametrize(('rate', 'kind'), [(50.0, ''), (25.0, 'rate')])
 def test_a_rate_at_which_no_foothold_is_kept_is_named(rate, kind):
     estimator = BodyEstimator(POINTED, rate=rate)
@@ -401,18 +335,3 @@ def test_a_rate_at_which_no_foothold_is_kept_is_named(rate, kind):
     assert found.doubt.partition(':')[0] == kind
     if kind:
         assert '0.04 s apart' in found.doubt
-
-
-def test_one_reading_after_a_gap_says_nothing_about_the_gap():
-    """A foot lands with a jolt just when the readings come back."""
-    times = [0.004 * step for step in range(250)]
-    times += [times[-1] + 5.0 + 0.004 * step for step in range(250)]
-    estimator = BodyEstimator(POINTED)
-    q = POINTED.home.ravel()
-    still, share = np.zeros(q.size), POINTED.mass * 9.81 / len(POINTED.legs)
-    forces = np.tile((0.0, 0.0, share), (len(POINTED.legs), 1))
-    doubts = set()
-    for step, time in enumerate(times):
-        pull = 14.0 if step == 250 else 9.81
-        doubts.add(estimator.update(time, np.zeros(3), (0.0, 0.0, pull), q, still, forces).doubt)
-    assert {each.partition(':')[0] for each in doubts} == {'', 'gap'}

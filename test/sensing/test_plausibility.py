@@ -73,14 +73,6 @@ def test_a_leg_that_slips_alone_is_named():
     assert legs.against.tolist() == [True, False, False, False, False, False]
 
 
-def test_legs_that_slip_most_of_all_under_a_load_are_not_named():
-    legs = walked([0.7, 0.4, 0.35, 0.65, 0.98, 0.98])
-    assert legs.doubt() == ''
-    assert legs.share == pytest.approx(0.677, abs=0.02)
-    assert not legs.agree
-    assert walked([0.3, 0.2, 0.1, 0.3, 0.2, 0.1]).agree
-
-
 def paced(slipping, seconds=12.0):
     """Return the Legs of a quadruped whose feet slip in the steps that a function gives."""
     legs = Legs(Robot.load('go2'))
@@ -129,10 +121,3 @@ def test_an_offset_of_more_than_half_of_the_load_is_named():
     unloaded, _ = swung((0.0, 0.0, 50.0))
     assert unloaded.doubt() == 'force: foot d shows more than half of the expected load in the air'
     assert not unloaded.offset.any()
-
-
-@pytest.mark.parametrize('lasts', [0.05, 0.7])
-def test_contacts_that_last_are_no_offset(lasts):
-    unloaded, _ = swung((0.0, 0.0, 0.0), lasts)
-    assert not unloaded.offset.any()
-    assert unloaded.doubt() == ''

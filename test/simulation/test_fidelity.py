@@ -1,20 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
-import importlib.util
 import math
 
-import numpy as np
 import pytest
 
-from ros_pad import configuration
-from ros_pad.contact import Foot, MeasuredLimit
+from ros_pad.contact import MeasuredLimit
 from ros_pad.control.morphology import MARGIN
-from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene, fidelity, margin, terms
 from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.rail_leg import RailLeg
 
 HEXAPOD, LEG = Scene.load('hexapod_patches'), Scene.load('leg_wet_flat')
 
@@ -31,22 +25,6 @@ def test_levels_of_robots():
         fidelity.level(HEXAPOD, 'L9')
 
 
-@pytest.mark.parametrize(
-    'scene, name, kind',
-    [(HEXAPOD, 'L1', PlanarRobot), (HEXAPOD, 'L2', FullRobot), (LEG, 'auto', RailLeg)],
-)
-def test_robots(scene, name, kind):
-    if kind is FullRobot:
-        pytest.importorskip('mujoco')
-    robot = fidelity.build(scene, scene.floor.build(0), 0.004, name)
-    assert isinstance(robot, kind)
-    assert robot.legs == scene.legs
-    assert len(robot.feet) == len(scene.legs)
-    assert len(robot.joint_names) == len(robot.joint_positions)
-    robot.step([0.0] * len(scene.legs))
-    assert robot.time == pytest.approx(0.004)
-
-
 # --- the choice -------------------------------------------------------------------------------
 
 
@@ -56,11 +34,10 @@ def with_bounds(monkeypatch, **bounds):
     lines = {
         f'{level.replace("_", " ")} {metric}': {'constant': math.log(bound + fidelity.LEAST)}
         | dict.fromkeys(names, 0.0)
-        for level, (distance, slip) in bounds.items()
-        for metric, bound in (('distance', distance), ('slip', slip))
+        for level, parts in bounds.items()
+        for metric, bound in zip(('distance', 'slip'), parts, strict=True)
     }
-    spans = {'ch3r': dict.fromkeys(names, (-math.inf, math.inf))}
-    promises = fidelity.Promises({'ch3r': {}}, spans, {'ch3r': lines})
+    promises = fidelity.Promises({'ch3r': {'ranges': {}, 'features': {}, 'bounds': lines}})
     monkeypatch.setattr(fidelity.Promises, 'load', lambda: promises)
 
 
@@ -72,36 +49,17 @@ def test_auto_takes_the_cheapest_level_that_is_accurate_enough(monkeypatch):
         assert choice.level == expected
         assert choice.bound == pytest.approx(l1 if expected == 'L1' else l2)
         assert ('requires 20 %' in choice.note) == (choice.bound > 0.2)
-    # A level that is given by name is used whatever its bound.
+    # A level that is given by name is used whatever its bound, which is rounded up in words.
     forced = fidelity.choose(scene, 'L1')
     assert (forced.level, forced.bound) == ('L1', pytest.approx(0.9))
-
-
-def test_auto_looks_at_the_metric_that_the_scene_asks_for(monkeypatch):
-    """L1 has no slip of a few millimetres: a scene that asks for slip does not get it."""
-    with_bounds(monkeypatch, L1=(0.05, 1.0), L2=(0.01, 0.1))
-    scene = dataclasses.replace(HEXAPOD, accuracy=0.2)
-    assert fidelity.choose(scene).level == 'L1'
+    for bound, words in [(0.0999, 'within 10 %'), (0.9901, 'off by up to 100 %')]:
+        with_bounds(monkeypatch, L1=(bound, 1.0), L2=(0.2, 0.1), no_slip=(bound, 1.0))
+        note = fidelity.choose(scene, 'L1').note
+        assert f'the distance on L1 is {words} of the top level' in note
+        assert (f'no slip at all, without a simulation, is {words}' in note) == (bound < 0.2)
+    # L1 has no slip of a few millimetres: a scene that asks for slip does not get it.
     slip = fidelity.choose(dataclasses.replace(scene, metric='slip'))
     assert (slip.level, slip.bound) == ('L2', pytest.approx(0.1))
-    assert 'the slip on L2 is within 10 %' in slip.note
-
-
-def test_the_answer_without_slip_is_named_where_it_suffices(monkeypatch):
-    for sticking, named in [(0.19, True), (0.21, False)]:
-        with_bounds(monkeypatch, L1=(0.1, 1.0), no_slip=(sticking, 1.0))
-        choice = fidelity.choose(dataclasses.replace(HEXAPOD, accuracy=0.2))
-        assert ('no slip at all, without a simulation, is within 19 %' in choice.note) == named
-
-
-@pytest.mark.parametrize(
-    'bound, words',
-    [(0.0999, 'within 10 %'), (0.99, 'within 99 %'), (0.9901, 'off by up to 100 %'),
-     (0.995, 'off by up to 100 %'), (1.62, 'off by up to 162 %')],
-)  # fmt: skip
-def test_bounds_in_words_are_rounded_up(monkeypatch, bound, words):
-    with_bounds(monkeypatch, L1=(bound, 1.0))
-    assert f'the distance on L1 is {words} of the top level' in fidelity.choose(HEXAPOD, 'L1').note
 
 
 def test_without_mujoco_auto_takes_l1_and_names_the_extra(monkeypatch):
@@ -121,23 +79,17 @@ def changed(owner, name, value):
     return dataclasses.replace(owner, **{part: value})
 
 
-@pytest.mark.parametrize('robot', ['ch3r', 'go2', 'rail_leg'])
-def test_no_promise_outside_the_ranges_drawn(robot):
+@pytest.mark.parametrize('name', ['hexapod_patches', 'quadruped_patches', 'leg_wet_dome_75'])
+def test_no_promise_outside_the_ranges_drawn(name):
     """Outside the ranges errors are unknown: no level has a bound, and the best one is chosen."""
-    names = {'ch3r': 'hexapod_patches', 'go2': 'quadruped_patches', 'rail_leg': 'leg_wet_dome_75'}
-    scene = Scene.load(names[robot])
+    scene = Scene.load(name)
     assert fidelity.choose(scene).bound < math.inf
-    ranges = fidelity.Promises.load().ranges[robot]
-    for name, (low, high) in ranges.items():
-        whole = name == 'foot.pads'
-        beyond = int(high) + 1 if whole else high + 0.01 * max(abs(high), 1e-6)
-        choice = fidelity.choose(changed(scene, name, beyond))
+    ranges = fidelity.Promises.load().robots[scene.robot]['ranges']
+    for key, (low, high) in ranges.items():
+        beyond = int(high) + 1 if key == 'foot.pads' else high + 0.01 * max(abs(high), 1e-6)
+        choice = fidelity.choose(changed(scene, key, beyond))
         assert choice.bound == math.inf
-        assert f'{name} = {beyond:.4g}, drawn from {low:.4g} to {high:.4g}' in choice.note
-        drawn = changed(scene, name, int(high) if whole else high)
-        assert f'{name} = ' not in fidelity.Promises.load().beyond(drawn)
-        if robot != 'rail_leg' and importlib.util.find_spec('mujoco'):
-            assert choice.level == 'L2'
+        assert f'{key} = {beyond:.4g}, drawn from {low:.4g} to {high:.4g}' in choice.note
     foot = {key.name: getattr(scene.foot, key.name) for key in dataclasses.fields(scene.foot)}
     numbers = {f'foot.{key}' for key, value in foot.items() if isinstance(value, (int, float))}
     assert numbers - {'foot._limit_cell'} <= ranges.keys()
@@ -151,7 +103,7 @@ def test_no_promise_with_what_was_not_drawn():
     slope = dataclasses.replace(HEXAPOD.floor, slope=0.08)
     limit = MeasuredLimit(0.3, 75e3, 4e-6)
     for scene, words in [
-        (silent, 'faults, of which none were drawn'),
+        (silent, 'faults'),
         (dataclasses.replace(HEXAPOD, floor=floor), 'a floor as in a drawing'),
         (dataclasses.replace(HEXAPOD, gait=gait), 'phases or pushes of the gait'),
         (changed(HEXAPOD, 'foot.pad.measured_limit', limit), 'pads, drawn were large ones'),
@@ -171,12 +123,6 @@ def test_no_promise_with_what_was_not_drawn():
     assert 'margin = -2' in fidelity.choose(worst).note
 
 
-def test_without_a_load_its_line_does_not_matter():
-    scene = Scene.load('hexapod_dry_slow')
-    assert (scene.tow.weight, scene.tow.distance) == (0.0, 0.0)
-    assert fidelity.choose(scene).bound < math.inf
-
-
 def test_shipped_scenes_for_which_l1_or_no_simulation_suffices():
     choice = fidelity.choose(Scene.load('hexapod_dry_slow'))
     assert choice.level == 'L1' and choice.bound < 0.1
@@ -190,42 +136,13 @@ def test_shipped_scenes_for_which_l1_or_no_simulation_suffices():
         assert fidelity.answer(dataclasses.replace(scene, **change)) is None
 
 
-@pytest.mark.parametrize(
-    'text, words',
-    [
-        ('bounds: {L0: [1]}', "fidelity.yaml: key 'robots' is missing"),
-        ('robots: {}\nreserves: [0, 1]: 3', 'fidelity.yaml, line 2, column 17: not valid YAML'),
-        (
-            'robots: {ch3r: {ranges: {}, features: {wet: [0, 1]}, bounds: {L1: {constant: 1}}}}',
-            "robots: ch3r: bounds: L1: key 'wet' is missing",
-        ),
-        (
-            'robots: {ch3r: {ranges: {}, features: {wet: [0, 1]}, bounds: {}}}',
-            'robots: ch3r: features are wet, needed are margin, near',
-        ),
-        (
-            'robots: {ch3r: {ranges: {body.size: [1, 2]}, features: {}, bounds: {}}}',
-            "robots: ch3r: ranges: of a scene, 'LeggedBody' object has no attribute 'size'",
-        ),
-    ],
-)
-def test_a_broken_or_old_file_of_bounds_names_its_key(monkeypatch, tmp_path, text, words):
-    (tmp_path / 'fidelity.yaml').write_text(text)
-    monkeypatch.setattr(fidelity.configuration, 'shared_folder', lambda: tmp_path)
-    with pytest.raises(ConfigError, match=words) as error:
-        fidelity.Promises.load.__wrapped__(fidelity.Promises).beyond(HEXAPOD)
-    assert str(error.value).endswith('write the file again with python -m studies fidelity')
-
-
-def test_a_bound_by_hand(monkeypatch):
-    line = {'constant': -3.0, 'margin': -0.5, 'ample': 0.1} | dict.fromkeys(
-        [name for name in fidelity.features(HEXAPOD) if name not in ('margin', 'ample')], 0.0
-    )
-    spans = {'ch3r': dict.fromkeys([*line][1:], (-math.inf, math.inf))}
-    promises = fidelity.Promises({'ch3r': {}}, spans, {'ch3r': {'L1 distance': line}})
+def test_a_bound_by_hand():
     tow = dataclasses.replace(HEXAPOD.tow, weight=0.0)
     floor = dataclasses.replace(HEXAPOD.floor, kind='dry')
     scene = dataclasses.replace(HEXAPOD, tow=tow, floor=floor)
+    line = dict.fromkeys(fidelity.features(scene), 0.0)
+    line |= {'constant': -3.0, 'margin': -0.5, 'ample': 0.1}
+    promises = fidelity.Promises({'ch3r': {'bounds': {'L1 distance': line}}})
     margin = 0.8 * 9.81 / (4.0 * math.pi * 0.14)  # 0.8 of the weight over the inertia
     expected = math.exp(-3.0 - 0.5 * math.log(margin) + 0.1 * math.log(margin / 2.0)) - 1e-4
     assert promises.bound('L1', scene, 'flat') == pytest.approx(expected, rel=1e-3)
@@ -259,42 +176,12 @@ def test_features_by_hand():
     assert flat['ample'] == 0.0
 
 
-def test_reserve_by_hand():
-    """Flat feet on dry ground: 0.8 of the weight over inertia, 4π stride/cycle², and tow."""
-    tow = dataclasses.replace(HEXAPOD.tow, weight=5.0, friction_dry=0.4)
-    floor = dataclasses.replace(HEXAPOD.floor, kind='dry')
-    gait = dataclasses.replace(HEXAPOD.gait, stride=0.1, cycle=1.0)
-    scene = dataclasses.replace(HEXAPOD, tow=tow, floor=floor, gait=gait)
-    mass, towed = 2.09, 5.0 / 9.81
-    demand = (mass + towed) * 4.0 * math.pi * 0.1 + 0.4 * 5.0
-    assert fidelity.reserve(scene, 'flat') == pytest.approx(0.8 * mass * 9.81 / demand, rel=1e-3)
-    # Uphill by 0.1 rad the demand is larger and the load smaller.
-    steep = dataclasses.replace(scene, floor=dataclasses.replace(floor, slope=0.1))
-    demand = (mass + towed) * (0.4 * math.pi + 9.81 * math.sin(0.1)) + 2.0 * math.cos(0.1)
-    expected = 0.8 * mass * 9.81 * math.cos(0.1) / demand
-    assert fidelity.reserve(steep, 'flat') == pytest.approx(expected, rel=1e-3)
-
-
-def test_reserve_of_the_rail_leg_by_hand():
-    """Capacity is 0.12 · 2.5 N; demand is 0.85 kg · π² S/2T², 0.987 m/s², and 0.235 N of drag."""
-    assert fidelity.reserve(LEG) == pytest.approx(0.30 / (0.85 * 0.98696 + 0.235), rel=1e-3)
-
-
 def test_reserve_of_the_rail_leg_on_a_slope():
-    for slope in (-0.1, 0.1):
+    """Capacity is 0.12 · 2.5 N; demand is 0.85 kg · π² S/2T², 0.987 m/s², slope, and drag."""
+    for slope in (-0.1, 0.0, 0.1):
         steep = dataclasses.replace(LEG, floor=dataclasses.replace(LEG.floor, slope=slope))
-        demand = 0.85 * (0.98696 + 9.81 * math.sin(0.1)) + 0.235
+        demand = 0.85 * (0.98696 + 9.81 * math.sin(abs(slope))) + 0.235
         assert fidelity.reserve(steep) == pytest.approx(0.30 / demand, rel=1e-3)
-
-
-@pytest.mark.parametrize('dry, wet', [(0.2, 0.5), (0.5, 0.2)])
-def test_reserve_where_feet_and_load_stand_on_the_worse_ground(dry, wet):
-    """Wet feet hold 0.12 of 20.50 N, and the sled of 5 N drags with its larger friction."""
-    tow = dataclasses.replace(HEXAPOD.tow, weight=5.0, friction_dry=dry, friction_wet=wet)
-    gait = dataclasses.replace(HEXAPOD.gait, stride=0.1, cycle=1.0)
-    scene = dataclasses.replace(HEXAPOD, tow=tow, gait=gait)
-    demand = (2.09 + 5.0 / 9.81) * 0.4 * math.pi + 0.5 * 5.0
-    assert fidelity.reserve(scene, 'flat') == pytest.approx(0.12 * 20.503 / demand, rel=1e-3)
 
 
 def test_reserve_on_a_film_in_mid_stance():
@@ -309,68 +196,18 @@ def test_reserve_on_a_film_in_mid_stance():
     expected = touching * dry + (1.0 - touching) * foot.boundary_friction
     assert expected < 0.95 * dry
     assert margin.mid_stance_grip(scene, True, True) == pytest.approx(expected, rel=1e-3)
-
-
-def test_domes_above_the_ceiling_leave_the_rest_to_the_sole():
-    """10 kg: of 32.7 N, 37 pads carry 0.2833 N + 12.5 uN/Pa · 15 kPa each at 90 kPa."""
+    # 10 kg: of 32.7 N, 37 pads carry 0.2833 N + 12.5 uN/Pa · 15 kPa each at the ceiling.
     heavy = margin.Stand(changed(HEXAPOD, 'body.mass', 10.0), True)
     assert heavy.pressure == HEXAPOD.foot.ceiling == 90e3
     assert heavy.on_sole == pytest.approx(10.0 * 9.81 / 3.0 - 37 * 0.4708, rel=1e-3)
     assert MARGIN.default == margin._MARGIN
 
 
-def test_reserve_is_least_where_feet_hold_least():
-    patches = {
-        policy: fidelity.reserve(HEXAPOD, policy) for policy in ('flat', 'dome', 'adaptive')
-    }
-    assert patches['flat'] < 0.5 * patches['dome']
-    # The margin is least on wet ground, where adaptive feet are domes.
-    assert patches['adaptive'] == patches['dome']
-    assert fidelity.reserve(HEXAPOD) == fidelity.reserve(HEXAPOD, HEXAPOD.policy)
-
-
 # --- what is left out -------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    'name', [name for name in configuration.names('scenes') if not name.startswith('bench_')]
-)
-def test_what_is_left_out(name):
-    scene = Scene.load(name)
-    found = terms.terms(scene)
-    left_out = [term for term in found if not term.taken]
-    assert len(left_out) >= (1 if scene.floor.kind == 'dry' else 3)
-    assert len({term.term for term in found}) == len(found)
-    for term in left_out:
-        assert term.term and term.reason
-        assert term.bound is None or 0.0 <= term.bound < 1.0
-        assert term.bound is None or term.reason.startswith('of the ')
-        assert term.kind == ('promise' if term.term.startswith('joints') else 'bound')
-
-
-def test_pads_of_a_material_leave_ballooning_out():
-    """The maximum of the small foot is between those of the neighbours of its material."""
-    assert not [t for t in terms.terms(HEXAPOD) if 'balloon' in t.term]
-    scene = dataclasses.replace(HEXAPOD, foot=Foot.load('small217'))
-    (term,) = (t for t in terms.terms(scene) if 'balloon' in t.term)
-    assert 'above 12663 Pa' in term.reason and '11000 Pa' in term.reason
 
 
 def bound(scene, word):
     return next((t.bound for t in terms.terms(scene) if word in t.term), None)
-
-
-def test_bound_of_contact_lines():
-    # By hand: 37 pads with 2 · 0.073 N/m · 3 mm each, over 0.35 · 6.834 N.
-    assert bound(HEXAPOD, 'capillary') == pytest.approx(37 * 0.000438 / 2.392, rel=1e-3)
-
-
-def test_a_foot_with_a_capillary_force_leaves_none_out():
-    foot = dataclasses.replace(HEXAPOD.foot, capillary_force=1e-4)
-    (line,) = (
-        t for t in terms.terms(dataclasses.replace(HEXAPOD, foot=foot)) if 'capillary' in t.term
-    )
-    assert line.taken and line.bound is None
 
 
 def test_bound_of_the_pull_of_liquid():
@@ -413,16 +250,6 @@ def test_contact_lines_that_matter_are_added_to_the_robot(monkeypatch):
     assert terms.with_terms(own).foot.capillary_force == 1e-4
 
 
-def test_with_an_accuracy_of_one_nothing_is_added(monkeypatch):
-    """The effect of contact lines, 0.68 % of friction times 400, is all of the distance."""
-    with_bounds(monkeypatch, L2=(0.01, 0.1), friction=(20.0, 0.1))
-    for accuracy, added in [(0.999, True), (1.0, False)]:
-        scene = dataclasses.replace(HEXAPOD, accuracy=accuracy)
-        (line,) = (t for t in terms.terms(scene) if t.term == terms.LINES)
-        assert (line.taken, line.exceeds) == (added, not added)
-        assert bool(terms.with_terms(scene).foot.capillary_force) == added
-
-
 @pytest.mark.parametrize('name', ['hexapod_patches', 'hexapod_dry_slow', 'leg_wet_dome_75'])
 def test_feet_without_friction_have_terms_without_bounds(name):
     """Of no friction nothing is a share; loads have theirs."""
@@ -439,101 +266,6 @@ def test_feet_without_friction_have_terms_without_bounds(name):
     assert all(each.bound is None or each.bound >= 0.0 for each in terms.terms(slippery))
 
 
-def test_outside_the_ranges_effects_are_not_known():
-    friction = dataclasses.replace(HEXAPOD.foot, friction=0.5)
-    scene = dataclasses.replace(HEXAPOD, foot=friction, accuracy=1e-4)
-    found = {term.term: term for term in terms.terms(scene)}
-    assert found['pull of the liquid to the floor'].effect is None
-    assert not found[terms.LINES].taken
-
-
-def test_film_that_a_dome_can_drag():
-    """The plane wedge with the largest pressure, by the closed form of Reynolds' equation.
-
-    With a film from h1 (1 + k) to h1 over a length L the mean pressure is η U L/h1² times
-    6/k² (ln(1 + k) - 2k/(2 + k)).
-    """
-    k = np.linspace(0.01, 10.0, 100001)
-    best = np.max(6.0 / k**2 * (np.log1p(k) - 2.0 * k / (2.0 + k)))
-    floor = dataclasses.replace(HEXAPOD.floor, viscosity=2e-3)
-    scene = dataclasses.replace(HEXAPOD, floor=floor, dome_pressure=75e3)
-    across = 2.0 * math.sqrt(2.09 * 9.81 / 3.0 / 37 / 75e3 / math.pi)
-    film = math.sqrt(best * 2e-3 * 0.01 * across / 75e3)
-    assert terms.dragged_film(scene, 0.01) == pytest.approx(film, rel=2e-3)
-
-
-# --- bounds of terms against switching them on --------------------------------------------------
-
-
-def grip_of(scene, pressure):
-    """Return the tangential capacity of the leg on its rail in the middle of its second stance.
-
-    To a step of 1 ms: of the 250 since touch-down, in which a film drained by its square.
-    """
-    robot = fidelity.build(scene, scene.floor.build(0), 0.001)
-    for _ in range(round((scene.gait.cycle + 0.5 * scene.gait.stance) / 0.001)):
-        robot.step([pressure])
-    assert robot.feet[0].standing
-    return robot.feet[0].grip
-
-
-@pytest.mark.parametrize('name', ['leg_wet_dome_75', 'leg_wet_dome_60', 'leg_wet_flat'])
-def test_terms_change_the_friction_by_no_more_than_their_bounds(name):
-    scene = dataclasses.replace(Scene.load(name), settle=0.0)
-    pressure, foot = scene.dome_pressure or 0.0, scene.foot
-    bounds = {each.term: each.bound for each in terms.terms(scene)}
-    own = grip_of(scene, pressure)
-    floor = dataclasses.replace(scene.floor, viscosity=10.0)
-    thin = dataclasses.replace(scene.floor, film_thickness=1e-9)
-    for other in (floor, thin):  # a film that never drains, and none
-        changed = grip_of(dataclasses.replace(scene, floor=other), pressure)
-        assert abs(changed / own - 1.0) <= bounds['film that drains'] * 1.001
-    if not pressure:
-        return
-    changed = [abs(grip_of(scene, part * pressure) / own - 1.0) for part in (0.0, 0.4, 0.7, 0.9)]
-    assert max(changed) == changed[0]  # pads that never fill, beside pads that fill in part
-    assert changed[0] == pytest.approx(bounds['air in hose and pads'], rel=0.01)
-    # Contact lines with angles of 170 and 10 degrees, twice the radius of a pad wide.
-    force = 0.073 * 2.0 * foot.pad.radius * 2.0 * math.cos(math.radians(10.0))
-    lines = dataclasses.replace(foot, capillary_force=force)
-    more = grip_of(dataclasses.replace(scene, foot=lines), pressure) - own
-    assert 0.0 < more <= bounds[terms.LINES] * foot.friction * scene.expected_load
-
-
-def test_soft_pads_change_the_distance_by_no_more_than_their_bound():
-    scene = dataclasses.replace(Scene.load('hexapod_dry_slow'), cycles=3, settle=0.0)
-    ends = []
-    for stiffness in (scene.foot.shear_stiffness, 1e4 * scene.foot.shear_stiffness):
-        foot = dataclasses.replace(scene.foot, shear_stiffness=stiffness)
-        robot = PlanarRobot(dataclasses.replace(scene, foot=foot), scene.floor.build(0), 0.004)
-        for _ in range(round(scene.duration / 0.004)):
-            robot.step([0.0] * 6)
-        ends.append(robot.body[0])
-    assert 0.0 < abs(ends[0] - ends[1]) <= bound(scene, 'soft pads') * ends[1]
-
-
-def test_soles_move_the_loads_of_a_tripod_by_no_more_than_their_bound():
-    """Three loads from the balance of force and moments, on feet moved by a radius at random."""
-    random, worst = np.random.default_rng(2), 0.0
-    homes = np.array(HEXAPOD.body.homes)
-    for middle in set(HEXAPOD.gait.middles):
-        feet = homes[[each == middle for each in HEXAPOD.gait.middles]]
-
-        def loads(places):
-            return np.linalg.solve(np.vstack([np.ones(3), places.T]), [1.0, 0.0, 0.0])
-
-        for angles in random.uniform(0.0, 2.0 * math.pi, (2000, 3)):
-            moved = HEXAPOD.foot.sole_radius * np.column_stack([np.cos(angles), np.sin(angles)])
-            # The ankles stay, as does the geometry; only the points of the loads move.
-            worst = max(worst, np.abs(loads(feet + moved) - loads(feet)).max())
-    most = bound(HEXAPOD, 'size of the sole') / 3.0
-    assert 0.6 * most < worst <= most
-
-
-def test_a_trot_has_no_bound_for_the_size_of_its_soles():
-    assert bound(Scene.load('quadruped_patches'), 'size of the sole') is None
-
-
 def reason(scene, word):
     return next(t.reason for t in terms.terms(scene) if word in t.term)
 
@@ -546,46 +278,18 @@ def test_suction_of_a_flat_sole_at_lift_off():
     """
     scene = Scene.load('hexapod_smooth_wet_flat')
     words = reason(scene, 'suction')
-    assert 'at most 92 N' in words and 'a film of 6.93 um pull with 1180 N a mm/s' in words
+    assert 'at most 92 N' in words
+    assert bound(Scene.load('hexapod_smooth_wet_dome'), 'suction') < 0.1 * bound(scene, 'suction')
     after = (12.0 * math.pi * 1e-3 * 0.017**4 / (3.701**2 * 92.0)) ** 0.2
     expected = 1.25 * 92.0 * after / (6.834 * 0.6)
     assert bound(scene, 'suction') == pytest.approx(expected, rel=2e-3)
 
 
-def test_suction_of_domes_acts_on_their_contact_alone():
-    scene = Scene.load('hexapod_smooth_wet_dome')
-    pressure = 70068.0  # 37 domes touch on 6.834 N / 70.07 kPa = 97.5 mm²
-    assert f'at most {101325.0 * 6.834 / pressure:.3g} N' in reason(scene, 'suction')
-
-
-def test_suction_under_feet_that_adapt_is_that_of_a_flat_one():
-    """They step flat onto wet ground before they know it."""
-    flat = terms.terms(HEXAPOD, policy='flat')
-    for policy in ('adaptive', 'oracle'):
-        assert terms.terms(HEXAPOD, policy=policy)[0] == flat[0]
-    assert flat[0].term.startswith('suction') and flat[0].bound > 0.1
-    assert terms.terms(HEXAPOD, policy='dome')[0].bound < 0.01
-
-
-def test_dimple_under_domes_and_under_a_sole():
-    """By hand: the lens of 0.424 · 7.53 kPa · 17 mm/395 kPa = 138 um has 235 um in its middle."""
-    flat = Scene.load('hexapod_smooth_wet_flat')
-    assert 'under the sole the dimple is 235 um' in reason(flat, 'dimple')
-    assert bound(flat, 'dimple') == pytest.approx(0.0, abs=1e-6)  # neither film is thin enough
-    # Rigid film 0.17 um: exp(-(0.17/0.5)²) = 0.89 dry; μ falls from 0.89 of dry to 0.12.
-    domes = Scene.load('hexapod_smooth_wet_dome')
-    assert 'under the domes the dimple is 5.54 um' in reason(domes, 'dimple')
-    assert 'of 0.173 um 88.7 %' in reason(domes, 'dimple')
-    dry = 0.35 + 4700.0 / 70068.0
-    wet = 0.89 * dry + 0.11 * 0.12
-    assert bound(domes, 'dimple') == pytest.approx(1.0 - 0.12 / wet, rel=0.01)
-
-
-def test_a_stiff_foot_has_no_dimple():
-    """In a very thick liquid the rigid film stays ten times as thick as the dimple."""
-    scene = Scene.load('hexapod_smooth_wet_flat')
-    floor = dataclasses.replace(scene.floor, viscosity=1e5, film_thickness=5e-3)
-    assert bound(dataclasses.replace(scene, floor=floor), 'dimple') is None
+def test_dimple_of_the_film_leaves_no_dry_contact():
+    """Rigid film 0.17 um: exp(-(0.17/0.5)²) = 0.89 dry; μ falls from 0.89 of dry to 0.12."""
+    wet = 0.89 * (0.35 + 4700.0 / 70068.0) + 0.11 * 0.12
+    found = bound(Scene.load('hexapod_smooth_wet_dome'), 'dimple')
+    assert found == pytest.approx(1.0 - 0.12 / wet, rel=0.01)
 
 
 def test_bound_of_soft_pads():
@@ -596,7 +300,3 @@ def test_bound_of_soft_pads():
     grip = bound(leg, 'soft pads') * 5e3 * 0.05 / 2.5
     assert grip == pytest.approx(0.35 + 4700 * min(1.0, 2.5 / 10444 / leg.foot.sole_area) *
                                  leg.foot.sole_area / 2.5, rel=1e-3)  # fmt: skip
-
-
-def test_a_dry_floor_has_no_menisci():
-    assert bound(Scene.load('leg_dry_flat'), 'capillary') is None

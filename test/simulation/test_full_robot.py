@@ -11,10 +11,9 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from ros_pad.errors import ConfigError, InvalidInput
-from ros_pad.robots import Robot
 from ros_pad.simulation import Scene
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.mujoco_model import POINT, SolverSettings
+from ros_pad.simulation.mujoco_model import SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Tow
 from ros_pad.simulation.terrain import Floor
@@ -109,38 +108,10 @@ def test_a_gait_that_no_leg_reaches(level, name, value):
         built(1.03 * most)
 
 
-@pytest.mark.parametrize('level', [FullRobot, PlanarRobot])
-def test_steering_that_no_leg_reaches(level):
-    gait = dataclasses.replace(GAIT, cycle=3.0)
-    scene = dataclasses.replace(scene_of(gait=gait), heading_gain=10.0)
-    with pytest.raises(
-        ConfigError, match=r'heading_gain = 10 1/s is not .* turned by -?[01]\.\d* rad'
-    ):
-        level(scene, DRY, 0.004)
-    level(dataclasses.replace(scene, heading_gain=1.0), DRY, 0.004)
-
-
-def test_legs_with_more_inertia_than_the_body():
-    body = dataclasses.replace(BODY, inertia=0.01)
-    with pytest.raises(ConfigError, match=r'inertia = 0\.01 kg m2'):
-        FullRobot(scene_of(body=body), DRY, 0.004)
-
-
 def test_missing_mujoco_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, 'mujoco', None)
     with pytest.raises(ConfigError, match=r'ros_pad\[mujoco\]'):
         FullRobot(scene_of(), DRY, 0.004)
-
-
-@pytest.mark.parametrize(
-    'wrong',
-    [{'timestep': 0.0}, {'timestep': 0.02}, {'integrator': 'RK4'}, {'cone': 'round'},
-     {'impratio': 0.5}, {'impratio': math.nan}, {'noslip_iterations': -1},
-     {'noslip_iterations': 1.5}],
-)  # fmt: skip
-def test_wrong_settings(wrong):
-    with pytest.raises(InvalidInput, match=next(iter(wrong))):
-        SolverSettings(**wrong)
 
 
 # --- statics ----------------------------------------------------------------------------------
@@ -179,20 +150,6 @@ def test_loads_at_rest():
     assert robot.verdict is None
 
 
-def test_loads_of_three_feet():
-    """On a tripod the loads follow from balance alone."""
-    robot = FullRobot(scene_of(0.8, gait=dataclasses.replace(GAIT, cycle=20.0)), DRY, 0.004)
-    advance(robot, 0.5 + 5.0)
-    places = np.array([foot.position for foot in robot.feet])[[0, 2, 4]]
-    centre = robot.data.subtree_com[robot.model.body('trunk').id]
-    balance = np.vstack([np.ones(3), places[:, 0], places[:, 1]])
-    wanted = np.linalg.solve(balance, WEIGHT * np.array([1.0, centre[0], centre[1]]))
-    found = [foot.force[2] for foot in robot.feet]
-    assert found[1::2] == [0.0, 0.0, 0.0]
-    # Tangential forces of feet that push against one another act in the floor and have no moment.
-    assert found[0::2] == pytest.approx(wanted, abs=0.15)
-
-
 def test_slope():
     """On a slope of 0.1 rad tangential forces add up to W sin, normal forces to W cos."""
     floor = dataclasses.replace(SHIPPED.floor, slope=0.1)
@@ -225,48 +182,10 @@ def test_creep_at_most_of_the_friction_limit(axis):
     assert creep_of(0.8, axis, DEFAULTS) > 1e-2
 
 
-def test_creep_goes_with_impratio_not_with_the_step():
-    slow = creep_of(0.8, 'y', SolverSettings(timestep=1e-3))
-    assert slow == pytest.approx(creep_of(0.8, 'y', SolverSettings(timestep=2e-3)), rel=0.1)
-    softer = creep_of(0.8, 'y', SolverSettings(impratio=20.0))
-    assert softer == pytest.approx(5.0 * slow, rel=0.3)
-
-
 def test_friction_limit():
     """Under a push of 0.95 μ W the robot stays, under 1.05 μ W it slides."""
     assert creep_of(0.95, 'y', SolverSettings()) < 2e-4
     assert creep_of(1.05, 'y', SolverSettings()) > 0.1
-
-
-def test_torsional_limit():
-    """With torsional friction only, six soles hold a moment of 2/3 R μ W = 0.116 N m."""
-    limit = 2.0 / 3.0 * 0.017 * 0.5 * WEIGHT
-    for share in (0.9, 1.1):
-        robot = standing(0.5)
-        for leg in robot.legs:
-            robot.model.pair(f'foot_{leg}').friction[:2] = 1e-5
-        # The servos hold the trunk relative to the feet. Only torsional friction of the soles
-        # keeps the whole robot from turning.
-        push(robot, yaw=share * limit)
-        mujoco.mj_step(robot.model, robot.data, 500)
-        assert (abs(robot.data.qvel[5]) > 0.2) == (share > 1.0)
-
-
-def test_moments_of_the_feet_hold_a_robot_that_is_turned():
-    """Soles with torsional friction only hold the yaw moment together, each with a share."""
-    torque = 0.5 * 2.0 / 3.0 * 0.017 * 0.5 * WEIGHT
-    robot = standing(0.5)
-    for leg in robot.legs:
-        robot.model.pair(f'foot_{leg}').friction[:2] = 1e-5
-    push(robot, yaw=torque)
-    moments = []
-    for _ in range(200):  # the robot sways on its servos
-        mujoco.mj_step(robot.model, robot.data, 20)
-        robot.soles.update()
-        moments.append([foot.moment for foot in robot.feet])
-    shares = np.mean(moments, axis=0) / -torque
-    assert shares.sum() == pytest.approx(1.0, abs=0.05)
-    assert shares.min() > 0.05
 
 
 def test_sliding_and_turning_feet_are_on_the_ellipsoid():
@@ -288,25 +207,6 @@ def test_sliding_and_turning_feet_are_on_the_ellipsoid():
     assert shares[speeds < 1e-3].min() < 0.5
 
 
-def test_light_feet_do_not_slip():
-    """With up to 1 N a contact does not count as landed, and its motion is no slip."""
-    robot = FullRobot(scene_of(0.2, tow=SHIPPED.tow), DRY, 0.004)
-    seen, last = {'light': 0, 'slips': 0}, [contacts(robot), np.zeros(6)]
-
-    def note():
-        places, paths = contacts(robot), np.array([foot.slip_path for foot in robot.feet])
-        moved, slipped = np.linalg.norm(places - last[0], axis=1), paths - last[1]
-        last[:] = places, paths
-        for foot, distance, slip in zip(robot.feet, moved, slipped, strict=True):
-            if foot.standing and distance > 1.01e-3 * robot.period:
-                light = foot.force[2] <= 1.0
-                seen['light' if light else 'slips'] += 1
-                assert slip == pytest.approx(0.0 if light else distance, rel=1e-6, abs=1e-12)
-
-    advance(robot, 2.5, note)
-    assert min(seen.values()) > 20
-
-
 @pytest.mark.parametrize('axis', ['x', 'y'])
 def test_work_lost_is_friction_times_way(axis):
     robot = standing(0.1)
@@ -316,42 +216,6 @@ def test_work_lost_is_friction_times_way(axis):
     assert min(ways) > 5e-3
     # Loads change as the body leans, but not their sum.
     assert robot.dissipation == pytest.approx(0.1 * WEIGHT * np.mean(ways), rel=0.05)
-
-
-def test_work_lost_in_turning_is_moment_times_angle():
-    """With torsional friction only, soles that turn on the spot lose 2/3 R μ W times the angle."""
-    limit = 2.0 / 3.0 * 0.017 * 0.5 * WEIGHT
-    robot = standing(0.5)
-    for leg in robot.legs:
-        robot.model.pair(f'foot_{leg}').friction[:2] = 1e-5
-    push(robot, yaw=1.3 * limit)
-    before, lost = robot.body[2], robot.dissipation
-    for _ in range(200):
-        mujoco.mj_step(robot.model, robot.data, 2)  # as ``step``, but friction is not updated
-        robot.soles.update()
-    turned = robot.body[2] - before
-    assert turned > 0.1
-    assert robot.dissipation - lost == pytest.approx(limit * turned, rel=0.05)
-
-
-def test_work_lost_is_what_the_contacts_of_mujoco_lose():
-    """On a dry walk most work is lost in torsion, as feet turn with their legs."""
-    robot = FullRobot(scene_of(0.5), DRY, 0.002)  # one MuJoCo step per period
-    slid = turned = 0.0
-
-    def note():
-        nonlocal slid, turned
-        data = robot.data
-        for geoms, row in zip(data.contact.geom, data.contact.efc_address, strict=True):
-            if robot.model.geom(geoms[1]).name.startswith('foot_'):
-                power = data.efc_force[row : row + 4] * data.efc_vel[row : row + 4]
-                slid -= power[1:3].sum() * robot.period
-                turned -= power[3] * robot.period
-
-    advance(robot, 0.5 + 2.0, note)
-    assert turned > slid > 0.05
-    # Below SLIP_SPEED and SLIP_LOAD no work is counted.
-    assert robot.dissipation == pytest.approx(slid + turned, rel=0.005)
 
 
 def test_grip_is_the_cone_of_the_step():
@@ -404,16 +268,6 @@ def test_film_is_whole_again_after_each_swing():
     assert np.count_nonzero(np.diff(ratios) < -0.1) == 1
 
 
-def test_marker_rides_on_sheared_pads():
-    robot = standing(0.5)
-    push(robot, y=0.5 * WEIGHT * 0.5)
-    advance(robot, 0.5)
-    for foot, place in zip(robot.feet, contacts(robot), strict=True):
-        assert np.array(foot.position[:2]) == pytest.approx(
-            place - np.array(foot.force[:2]) / 5000.0, abs=1e-12
-        )
-
-
 # --- walking ----------------------------------------------------------------------------------
 
 
@@ -431,24 +285,6 @@ def test_dry_walk_against_the_planar_robot():
     left, right = full.feet[:3], full.feet[:2:-1]
     for one, other in zip(left, right, strict=True):
         assert one.slip_path == pytest.approx(other.slip_path, rel=0.1)
-
-
-def test_convergence_in_the_step():
-    """At 2 ms distance and slip of a dry walk are within 1 % and 15 % of those at 0.25 ms."""
-    ends = []
-    for timestep in (0.002, 0.00025):
-        robot = FullRobot(scene_of(tow=SHIPPED.tow), DRY, 0.004, SolverSettings(timestep=timestep))
-        x, _, _ = advance(robot, 0.5 + 2.0)
-        ends.append((x, sum(foot.slip_path for foot in robot.feet)))
-    assert ends[0][0] == pytest.approx(ends[1][0], rel=0.01)
-    assert ends[0][1] == pytest.approx(ends[1][1], rel=0.15)
-
-
-def test_the_same_twice():
-    one, other = (FullRobot(scene_of(tow=SHIPPED.tow), WET, 0.004) for _ in range(2))
-    assert advance(one, 1.5) == advance(other, 1.5)
-    assert [foot.force for foot in one.feet] == [foot.force for foot in other.feet]
-    assert one.joint_positions == other.joint_positions
 
 
 def test_tow():
@@ -472,76 +308,6 @@ def test_tow():
     assert work == pytest.approx(12.0 * 0.2 * (sled[-1] - sled[0]), rel=0.02)
     assert push.mean() == pytest.approx(tension.mean(), rel=0.05)
     assert sled[-1] - sled[0] == pytest.approx(4 * GAIT.stride, rel=0.05)
-
-
-def test_tow_feels_the_ground_below_it():
-    floor = Floor(np.array([[True, False]]), 50.0, (0.0, -1.0), 3e-4)  # wet from x = 0 to 50
-    tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.1, distance=0.1, height=0.03)
-    robot = FullRobot(scene_of(0.8, tow=tow), floor, 0.004)
-    seen = set()
-
-    def note():
-        x = robot.data.geom('sled').xpos[0]
-        if abs(x) > 5e-3:
-            ratio = float(robot.model.pair('sled').friction[0])
-            seen.add((bool(x > 0.0), ratio))
-
-    advance(robot, 0.5 + 2.0, note)
-    assert seen == {(False, 0.5), (True, 0.1)}
-
-
-def test_line_only_pulls():
-    """A body that is pushed back towards the sled does not push the sled."""
-    tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, distance=0.4, height=0.12)
-    robot = standing(0.05, tow=tow)
-    rest = robot.data.geom('sled').xpos[0]
-    push(robot, x=-4.0)
-    advance(robot, 0.3)
-    assert robot.body[0] < -0.02
-    assert robot.data.geom('sled').xpos[0] == pytest.approx(rest, abs=1e-3)
-
-
-def test_stiff_lines_take_shorter_steps():
-    """The time step is shortened for stiff lines: at 2 ms 1 MN/m would throw the robot over."""
-    ways = {}
-    for stiffness in (2e3, 1e6):
-        tow = Tow(0.5, 0.5, 0.5, 0.25, 0.03, stiffness)
-        robot = FullRobot(scene_of(tow=tow), DRY, 0.004)
-        ways[stiffness] = advance(robot, 2.5)[0]
-        assert robot.verdict is None
-        reduced = 1.0 / (9.81 / 0.5 + 1.0 / 2.09)
-        assert robot.model.opt.timestep < 2.0 * math.sqrt(reduced / stiffness)
-    assert ways[1e6] == pytest.approx(ways[2e3], rel=0.01)
-    with pytest.raises(ConfigError, match=r'tow.weight = 1e-09 N on a line of .* 2000 N/m needs'):
-        FullRobot(scene_of(tow=Tow(1e-9, 0.5, 0.5, 0.25, 0.03)), DRY, 0.004)
-
-
-def test_steering():
-    robot = FullRobot(scene_of(heading_gain=1.0), DRY, 0.004)
-    robot.data.qpos[3:7] = (math.cos(0.1), 0.0, 0.0, math.sin(0.1))
-    _, _, heading = advance(robot, 0.5 + 2.0)
-    # The heading decays with exp(-gain t) over 2.5 s, also while the robot settles.
-    assert heading == pytest.approx(0.2 * math.exp(-2.5), abs=0.02)
-
-
-def test_uneven_ground():
-    floor = DRY.uneven(2e-3, 3)
-    robot = FullRobot(scene_of(), floor, 0.004)
-    tops = []
-
-    def note():
-        for foot in robot.feet:
-            if foot.force[2] > 3.0:
-                x, y, z = foot.position
-                tops.append((floor.height(x, y), z))
-
-    advance(robot, 0.5 + 3.0, note)
-    heights, places = np.array(tops).T
-    assert np.ptp(heights) > 2e-3
-    # A foot sinks in a little, and near the edge of a cell it may stand on the next cell.
-    assert np.median(np.abs(places - heights)) < 6e-4
-    assert np.corrcoef(heights, places)[0, 1] > 0.8
-    assert robot.verdict is None
 
 
 # --- verdicts ---------------------------------------------------------------------------------
@@ -574,7 +340,7 @@ def test_lost_solution(tmp_path, monkeypatch):
     assert 'the solution of MuJoCo has diverged' in robot.verdict
 
 
-@pytest.mark.parametrize('pressures', [[0.0] * 5, [0.0] * 7, [math.nan] * 6, [math.inf] * 6])
+@pytest.mark.parametrize('pressures', [[0.0] * 5, [math.nan] * 6])
 def test_bad_pressures(pressures):
     robot = FullRobot(scene_of(), DRY, 0.004)
     with pytest.raises(InvalidInput, match='6 finite numbers'):
@@ -583,8 +349,7 @@ def test_bad_pressures(pressures):
 
 
 @pytest.mark.parametrize(('lift', 'unevenness', 'clears'), [
-    (0.03, 0.0, True), (0.03, 5e-4, True), (0.006, 0.0, True),
-    (0.003, 0.0, False), (0.006, 5e-4, False), (0.015, 5e-3, False),
+    (0.03, 5e-4, True), (0.006, 0.0, True), (0.003, 0.0, False), (0.006, 5e-4, False),
 ])  # fmt: skip
 def test_a_foot_that_does_not_clear_the_ground_ends_the_walk(lift, unevenness, clears):
     """Film and ground height of such a foot would stay those of its last step."""
@@ -613,29 +378,6 @@ def walked(seconds=2.5):
         yield robot.time, robot.proprioception(), robot
 
 
-def test_kinematics_of_the_ch3_r_file_are_those_of_the_simulated_robot():
-    ch3r = Robot.load('ch3r')
-    for time, felt, robot in walked():
-        if time < 2.2:
-            continue
-        assert ch3r.joint_names == robot.joint_names
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, robot.data.qpos[3:7])
-        turn = turn.reshape(3, 3)
-        found = ch3r.kinematics(felt.positions)
-        feet = found.positions @ turn.T + robot.data.qpos[:3]
-        mujoco.mj_kinematics(robot.model, robot.data)  # places of feet at the end of the step
-        first = robot.model.geom('foot_1').id
-        true = robot.data.geom_xpos[first : first + 6] - [0.0, 0.0, POINT]
-        assert np.abs(feet - true).max() < 3e-5  # the ball is upright only at home
-        # Forces are those at the beginning of the last step of 2 ms, in which links turn a little.
-        forces = np.einsum('lij,lj->li', found.rotations, np.array(felt.forces)) @ turn.T
-        for found_force, foot in zip(forces, robot.feet, strict=True):
-            assert found_force == pytest.approx(
-                np.array(foot.force), abs=0.02 + 0.01 * foot.force[2]
-            )
-
-
 def test_gyro_and_accelerometer_integrate_to_the_motion():
     rows = [
         (*felt.gyro, *felt.accelerometer, *robot.data.qvel[:3], *robot.data.qpos[3:7])
@@ -652,19 +394,3 @@ def test_gyro_and_accelerometer_integrate_to_the_motion():
     assert np.ptp(rows[250:, 6]) > 0.15  # the walk is not trivial
     angles = np.unwrap(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
     assert 0.004 * rows[:, 2].sum() == pytest.approx(angles[-1], abs=2e-3)
-
-
-def test_velocities_and_efforts_of_the_joints():
-    rows = [(felt.positions, felt.velocities) for _, felt, _ in walked()]
-    positions, velocities = np.array(rows).transpose(1, 0, 2)
-    moved = 0.004 * 0.5 * (velocities[1:] + velocities[:-1])
-    assert np.abs(np.diff(positions, axis=0) - moved).max() < 2e-3
-    assert np.abs(np.diff(positions, axis=0)).max() > 0.01
-    # At rest the joints carry the weight of the links and the forces of the ground on the feet.
-    ch3r = Robot.load('ch3r')
-    *_, (_, felt, robot) = walked(0.4)
-    forces = np.array([foot.force for foot in robot.feet])
-    assert np.abs(forces).max() > 2.0
-    lines = ch3r.foot_jacobians(felt.positions)
-    held = ch3r.gravity_torques(felt.positions) - np.einsum('lij,li->lj', lines, forces)
-    assert np.array(felt.efforts).reshape(6, 3) == pytest.approx(held, abs=2e-3)

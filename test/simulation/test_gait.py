@@ -6,7 +6,6 @@ import pytest
 from scipy.integrate import quad
 
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.planar_step import load_share
 
 MIDDLES = (0.25, 0.75, 0.25, 0.75, 0.25, 0.75)
 GAIT = WalkingGait(1.2, 0.16, 0.6, 0.03, MIDDLES, pushes=True)
@@ -30,21 +29,6 @@ def test_advance_is_the_integral_of_speed(time):
     assert GAIT.body_advance(time) == pytest.approx(expected, abs=1e-10)
 
 
-def test_a_stride_a_cycle():
-    for start in (0.0, 0.17, 5.0):
-        advance = GAIT.body_advance(start + 1.2) - GAIT.body_advance(start)
-        assert advance == pytest.approx(0.16)
-
-
-def test_speed_is_zero_where_tripods_change_and_never_negative():
-    times = np.linspace(0.0, 1.2, 1201)
-    speeds = np.array([body_speed(time) for time in times])
-    assert speeds.min() > -1e-12
-    assert speeds[[0, 600, 1200]] == pytest.approx(0.0, abs=1e-12)
-    found = np.abs(np.gradient(speeds, times)).max()
-    assert GAIT.peak_acceleration == pytest.approx(found, rel=1e-3)
-
-
 @pytest.mark.parametrize('duty', DUTIES)
 def test_stance_is_centred_on_the_push(duty):
     gait = gait_of(duty)
@@ -56,34 +40,6 @@ def test_stance_is_centred_on_the_push(duty):
         away = (times[standing] - pushes[leg] + 0.6) % 1.2 - 0.6
         assert away.mean() == pytest.approx(0.0, abs=1e-3)
         assert np.abs(away).max() == pytest.approx(0.5 * duty * 1.2, abs=1e-3)
-
-
-@pytest.mark.parametrize('duty', DUTIES)
-def test_shares_of_the_two_tripods_make_one(duty):
-    gait = gait_of(duty)
-    for time in np.linspace(0.0, 2.4, 997):
-        shares = [
-            load_share(duty, gait.overlap, gait.phase(tripod[0], time)) for tripod in TRIPODS
-        ]
-        assert all(0.0 <= share <= 1.0 for share in shares)
-        assert sum(shares) == pytest.approx(1.0, abs=1e-9)
-
-
-@pytest.mark.parametrize('duty', DUTIES)
-def test_share_comes_and_goes_softly(duty):
-    phases = np.linspace(0.0, 1.0, 20001)
-    shares = np.array([load_share(duty, duty - 0.5, phase) for phase in phases])
-    assert load_share(duty, duty - 0.5, duty) == load_share(duty, duty - 0.5, 0.999) == 0.0
-    steepest = 1.5 / (duty - 0.5)  # slope of the smooth step
-    assert np.abs(np.diff(shares)).max() < 1.01 * steepest * (phases[1] - phases[0])
-
-
-def test_tripods():
-    assert sorted(TRIPODS[0] + TRIPODS[1]) == list(LEGS)
-    for tripod in TRIPODS:
-        assert len({GAIT.phase(leg, 0.37) for leg in tripod}) == 1
-    shift = (GAIT.phase(0, 0.37) - GAIT.phase(1, 0.37)) % 1.0
-    assert shift == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize('duty', DUTIES)

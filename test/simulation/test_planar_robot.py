@@ -6,11 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from ros_pad.errors import InvalidInput
-from ros_pad.robots import Chains
 from ros_pad.simulation import Scene, planar_step
 from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.scene import FloorPlan, Tow
+from ros_pad.simulation.scene import Tow
 from ros_pad.simulation.terrain import Floor
 
 SHIPPED = Scene.load('hexapod_patches')
@@ -19,7 +17,6 @@ WEIGHT = BODY.mass * 9.81
 FLAT = [0.0] * 6
 DRY, WET = Floor.uniform(False, 3e-4), Floor.uniform(True, 3e-4)
 RIGHT_WET = Floor(np.array([[True], [False]]), 50.0, (0.0, -50.0), 3e-4)
-LEFT_WET = Floor(np.array([[False], [True]]), 50.0, (0.0, -50.0), 3e-4)
 
 
 def scene_of(friction=None, **changes):
@@ -92,40 +89,6 @@ def test_loads_balance_weight_and_moments_in_a_walk(tow):
     assert np.abs(expected).max() > 0.1
 
 
-def test_speeding_up_loads_the_hind_feet():
-    robot = robot_of(scene_of(friction=2.0))
-    for _ in range(round(1.0 * GAIT.cycle / robot.period)):
-        robot.step(FLAT)
-        push = sum(foot.force[0] for foot in robot.feet)
-        if push > 2.0:
-            break
-    before = push
-    robot.step(FLAT)
-    assert before > 2.0
-    assert moments(robot)[1] < -0.5 * BODY.height * before
-
-
-def test_braking_sideways_loads_the_feet_in_front_of_the_motion():
-    """A body that moves to the left loads its left feet, ΣN y = -H ΣF_y, at any heading."""
-    for heading in (0.0, 0.7):
-        robot = robot_of(scene_of(settle=1.0))
-        robot.state[planar_step.HEADING] = heading
-        robot.state[planar_step.SPEED_X] = -0.2 * math.sin(heading)
-        robot.state[planar_step.SPEED_Y] = 0.2 * math.cos(heading)
-        last = 0.0
-        for _ in range(10):
-            robot.step(FLAT)
-            _, ahead, left = moments(robot)
-            assert left == pytest.approx(-BODY.height * last, rel=1e-2, abs=5e-4)
-            assert abs(ahead) < 0.05 * abs(left) + 1e-3
-            last = sum(
-                math.cos(heading) * foot.force[1] - math.sin(heading) * foot.force[0]
-                for foot in robot.feet
-            )
-            assert last < 0.0 or robot.time > 0.02
-        assert robot.verdict is None
-
-
 @pytest.mark.parametrize('height', [0.12, 1.2])
 def test_tip_over(height):
     """At 4π S/T² = 2.0 m/s² and feet 0.1 m behind the centre, bodies tip from 0.5 m height on."""
@@ -153,58 +116,6 @@ def test_dry_level_walk_advances_a_stride_a_cycle(period):
     assert max(foot.slip_path for foot in robot.feet) < 5 * 2e-3
 
 
-def test_symmetric_walk_does_not_drift():
-    """Tripods mirror one another half a cycle apart: the body sways, but does not drift."""
-    robot = robot_of(scene_of(friction=0.15, tow=SHIPPED.tow))
-    ends = []
-    for _ in range(8):
-        ends.append(walk(robot, 1.0))
-    ends = np.array(ends)
-    # The robot slips in each stride, so that drift would be possible.
-    assert ends[-1, 0] < 0.9 * 8 * GAIT.stride
-    drift = (ends[-1] - ends[1]) / 6.0
-    assert abs(drift[1]) < 1e-3
-    assert abs(drift[2]) < math.radians(0.2)
-
-
-def test_friction_coefficient_that_a_level_walk_needs():
-    """Without slip μ g must exceed the peak acceleration 4π S/T² = 1.76 m/s², so μ > 0.179."""
-    slip = {}
-    for friction in (0.13, 0.165, 0.22, 0.27):
-        robot = robot_of(scene_of(friction=friction))
-        walk(robot, 3.0)
-        slip[friction] = sum(foot.slip_path for foot in robot.feet)
-    assert GAIT.peak_acceleration == pytest.approx(1.7593, rel=1e-4)
-    assert slip[0.13] > slip[0.165] > 5.0 * slip[0.27]
-    # Low friction alone hardly slows a level walk: the body loses speed first and gains it later.
-    x, _, _ = walk(robot_of(scene_of(friction=0.1)), 5.0)
-    assert x > 0.9 * 5 * GAIT.stride
-
-
-@pytest.mark.parametrize('floor, side', [(RIGHT_WET, -1.0), (LEFT_WET, 1.0)])
-def test_wet_on_one_side_turns_the_robot_to_it(floor, side):
-    """Feet on the dry side push more, so that the body turns to the wet side."""
-    tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, height=0.03)
-    robot = robot_of(scene_of(tow=tow), floor)
-    _, y, heading = walk(robot, 4.0)
-    assert side * heading > math.radians(1.0)
-    assert side * y > 0.0
-
-
-def test_mirrored_robot_on_a_mirrored_floor():
-    """A mirrored robot on a mirrored floor makes the mirrored walk."""
-    tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, height=0.03)
-    robot = BODY.robot  # on the other side of leg 1 is leg 6
-    chains = Chains(robot.chains.legs[::-1], robot.chains.feet[::-1])
-    robot = dataclasses.replace(robot, chains=chains, hips=robot.hips[::-1], home=robot.home[::-1])
-    homes = tuple((x, -y) for x, y in BODY.homes)
-    mirrored = dataclasses.replace(BODY, homes=homes, robot=robot)
-    one = walk(robot_of(scene_of(tow=tow), RIGHT_WET), 6.0)
-    other = walk(robot_of(scene_of(tow=tow, body=mirrored), LEFT_WET), 6.0)
-    assert abs(one[2]) > math.radians(1.0)
-    assert other == pytest.approx((one[0], -one[1], -one[2]), abs=1e-6)
-
-
 def test_heading_hold_steers_back():
     tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, height=0.03)
     free = walk(robot_of(scene_of(tow=tow), RIGHT_WET), 6.0)
@@ -215,19 +126,6 @@ def test_heading_hold_steers_back():
     robot.state[planar_step.HEADING] = 0.2
     _, _, heading = walk(robot, 4.0)
     assert heading == pytest.approx(0.2 * math.exp(-2.0), rel=0.05)
-
-
-def test_turned_robot_walks_where_it_points():
-    straight = robot_of(scene_of(friction=0.5))
-    turned = robot_of(scene_of(friction=0.5))
-    turned.state[planar_step.HEADING] = 0.7
-    for robot in (straight, turned):
-        walk(robot, 2.0)
-    x, y, heading = turned.body
-    ahead, aside, _ = straight.body
-    assert heading == pytest.approx(0.7 + straight.body[2], abs=1e-9)
-    assert x == pytest.approx(ahead * math.cos(0.7) - aside * math.sin(0.7), abs=1e-9)
-    assert y == pytest.approx(ahead * math.sin(0.7) + aside * math.cos(0.7), abs=1e-9)
 
 
 def test_tow_drag():
@@ -256,13 +154,13 @@ def test_tow_feels_the_ground_behind_the_robot():
     foot = dataclasses.replace(scene.foot, boundary_friction=0.8)  # wet feet hold, too
     robot = robot_of(dataclasses.replace(scene, foot=foot), floor)
     caps = []
-    walk(robot, 4.0, lambda: caps.append((robot.body[0] - 0.3, robot.state[planar_step.SLED_CAP])))
+    walk(robot, 4.0, lambda: caps.append((robot.body[0] - 0.3, robot.state[planar_step.SLED_X])))
     last = 0.0
     for behind, cap in caps:
         if abs(behind) > 1e-2:
-            assert cap == (0.0 if behind > 0.0 else 6.0)
+            assert abs(cap) <= 3.0001e-3 and (cap == 0.0 or behind < 0.0)
             last = max(last, behind)
-    assert last > 0.05
+    assert last > 0.05 and max(abs(cap) for _, cap in caps) > 2.999e-3
 
 
 # --- feet -------------------------------------------------------------------------------------
@@ -315,16 +213,6 @@ def test_forces_and_grip():
     assert slipped > 100
 
 
-def test_only_one_tripod_is_down_at_mid_stance():
-    robot = robot_of(scene_of())
-    walk(robot, 0.25)
-    assert tuple(leg for leg, foot in zip(robot.legs, robot.feet, strict=True)
-                 if foot.standing) == (1, 3, 5)  # fmt: skip
-    walk(robot, 0.5)
-    assert tuple(leg for leg, foot in zip(robot.legs, robot.feet, strict=True)
-                 if foot.standing) == (2, 4, 6)  # fmt: skip
-
-
 def test_pressures_reach_the_feet():
     """On wet ground domes hold and flat feet float; at 60 kPa 37 pads are overloaded."""
     grips, overloads = {}, {}
@@ -356,47 +244,6 @@ def test_dissipation():
     grip = robot_of(scene_of(friction=2.0))
     walk(grip, 2.0)
     assert grip.dissipation < 1e-3
-
-
-def test_result_does_not_hang_on_the_step():
-    """The distance of domes on a slippery floor converges at steps of 4, 2 and 1 ms."""
-    ends = []
-    for period in (0.004, 0.002, 0.001):
-        robot = robot_of(scene_of(tow=SHIPPED.tow), WET, period)
-        ends.append(walk(robot, 4.0, pressures=[70e3] * 6)[0])
-    assert ends[0] == pytest.approx(ends[2], rel=0.02)
-    assert abs(ends[1] - ends[2]) < abs(ends[0] - ends[2])
-
-
-def test_the_same_twice():
-    one, other = (robot_of(scene_of(tow=SHIPPED.tow), WET) for _ in range(2))
-    assert walk(one, 2.0) == walk(other, 2.0)
-    assert [f.force for f in one.feet] == [f.force for f in other.feet]
-
-
-def test_floor_of_the_scene_is_not_needed():
-    """A robot walks on the floor that it receives, not on that of its scene."""
-    plan = FloorPlan('wet', 3e-4, 1e-3)
-    robot = robot_of(scene_of(floor=plan), DRY)
-    walk(robot, 1.0)
-    assert not any(foot.wet for foot in robot.feet)
-
-
-def test_a_towed_mass_slows_the_start():
-    """Slipping feet push body and load with F = μ W: a = (F - D)/(m + m_tow)."""
-    tow = Tow(weight=12.0, friction_dry=0.05, friction_wet=0.05, height=BODY.height)
-    robot = robot_of(scene_of(friction=0.05, tow=tow))
-    speeds, pushes = [], []
-    last = 0.0
-    for _ in range(50):
-        robot.step([0.0] * 6)
-        speeds.append((robot.body[0] - last) / robot.period)
-        last = robot.body[0]
-        pushes.append(sum(foot.force[0] for foot in robot.feet))
-    gained = speeds[-1] - speeds[-11]
-    wanted = (np.mean(pushes[-10:]) - 0.6) / (BODY.mass + 12.0 / 9.81) * 10 * robot.period
-    assert gained > 0.0
-    assert gained == pytest.approx(wanted, rel=1e-6)
 
 
 # --- slopes and uneven ground -------------------------------------------------------------------
@@ -432,39 +279,6 @@ def test_standing_on_a_slope(tow):
     assert robot.verdict is None
 
 
-@pytest.mark.parametrize('floor, friction', [(DRY, 0.4), (WET, 0.2)])
-def test_a_sled_presses_less_on_a_slope(floor, friction):
-    tow = Tow(weight=5.0, friction_dry=0.4, friction_wet=0.2)
-    robot = robot_of(sloping(0.5, tow=tow), floor)
-    robot.step(FLAT)
-    drag = friction * 5.0 * math.cos(0.5)
-    assert robot.state[planar_step.SLED_CAP] == pytest.approx(drag, rel=1e-12)
-
-
-def test_sled_is_behind_a_robot_that_has_turned():
-    tow = Tow(weight=5.0, friction_dry=0.4, friction_wet=0.2, distance=0.4)
-    robot = robot_of(scene_of(tow=tow), RIGHT_WET)
-    # The robot is 0.1 m left of the edge and points to the left: the sled is 0.3 m right of it.
-    robot.state[planar_step.Y], robot.state[planar_step.HEADING] = 0.1, math.pi / 2.0
-    robot.step(FLAT)
-    assert robot.state[planar_step.SLED_CAP] == 0.2 * 5.0
-
-
-def test_sliding_down_a_slope():
-    """On a slope steeper than its friction the robot slides at a = g (sin - μ cos)."""
-    slope, friction = 0.3, 0.1
-    robot = robot_of(sloping(slope, friction=friction, settle=10.0), period=1e-3)
-    for _ in range(500):
-        robot.step(FLAT)
-    expected = -0.5 * 9.81 * (math.sin(slope) - friction * math.cos(slope)) * 0.5**2
-    assert robot.body[0] == pytest.approx(expected, rel=0.01)
-
-
-def test_slope_costs_a_slipping_robot_its_way():
-    ends = [walk(robot_of(sloping(slope, friction=0.15)), 4.0)[0] for slope in (-0.1, 0.0, 0.1)]
-    assert ends[0] > ends[1] > ends[2] + 0.05
-
-
 def test_uneven_ground_moves_loads_between_redundant_feet_only():
     uneven = DRY.uneven(1e-3, 2)
     even, bumpy = robot_of(scene_of(friction=0.8)), robot_of(scene_of(friction=0.8), uneven)
@@ -477,7 +291,7 @@ def test_uneven_ground_moves_loads_between_redundant_feet_only():
             abs(one.force[2] - other.force[2])
             for one, other in zip(even.feet, bumpy.feet, strict=True)
         )
-        if sum(gait_share > 0.0 for gait_share in shares(even)) == 3:
+        if sum(foot.standing for foot in even.feet) == 3:
             together = max(together, differ)
         else:
             apart = max(apart, differ)
@@ -487,62 +301,4 @@ def test_uneven_ground_moves_loads_between_redundant_feet_only():
     assert bumpy.body[0] == pytest.approx(even.body[0], rel=0.02)
 
 
-def shares(robot):
-    return [
-        planar_step.load_share(GAIT.duty, GAIT.overlap, phase)
-        for phase in robot.table[planar_step.PHASE]
-    ]
-
-
 # --- soles that turn with their legs ------------------------------------------------------------
-
-
-def test_hips_are_where_the_legs_begin():
-    """Hips of the CH3-R: middle legs 138 mm to the side, front legs 119 mm ahead and 69 mm to
-    the side."""
-    model = robot_of(scene_of()).model
-    hips = np.column_stack([model.trunk.hip_x, model.trunk.hip_y])
-    assert hips[1] == pytest.approx([0.0, 0.138], abs=1e-6)
-    assert hips[0] == pytest.approx([0.119, 0.069], abs=5e-4)
-    assert np.hypot(*(np.array(BODY.homes) - hips).T) == pytest.approx(0.086)
-
-
-def test_soles_turn_by_the_angle_of_their_leg():
-    """Over a stance without slip the gait turns a sole by the angle that its leg turns."""
-    robot = PlanarRobot(scene_of(friction=5.0), DRY, 0.001, soles_turn=True)
-    hips = np.column_stack([robot.model.trunk.hip_x, robot.model.trunk.hip_y])
-
-    def bearing(index):
-        x = BODY.homes[index][0] + robot.table[planar_step.OFFSET_X][index] - hips[index][0]
-        y = BODY.homes[index][1] + robot.table[planar_step.OFFSET_Y][index] - hips[index][1]
-        return math.atan2(y, x)
-
-    before, turned = [bearing(index) for index in (0, 2, 4)], np.zeros(3)
-    for _ in range(250):
-        robot.step(FLAT)
-        turned += np.array(robot.table[planar_step.STEP_TURN])[[0, 2, 4]]
-    assert turned == pytest.approx(np.array([bearing(i) for i in (0, 2, 4)]) - before, abs=1e-6)
-    assert np.abs(turned).min() > 0.1
-
-
-def test_soles_that_turn_scrub_the_floor():
-    """Soles that turn lose work and slip a little at any friction, those of middle legs most."""
-    still, turning = (
-        PlanarRobot(scene_of(friction=0.8), DRY, 0.004, soles_turn=each) for each in (False, True)
-    )
-    for robot in (still, turning):
-        walk(robot, 6.0)
-    paths = np.array([foot.slip_path for foot in turning.feet])
-    assert turning.dissipation > 50.0 * still.dissipation
-    assert paths.min() > 1.5 * max(foot.slip_path for foot in still.feet)
-    assert paths[[1, 4]].min() > 1.2 * paths[[0, 2, 3, 5]].max()
-    assert turning.body[0] == pytest.approx(still.body[0], rel=0.03)
-    for foot in turning.feet:
-        radius = 2.0 / 3.0 * SHIPPED.foot.sole_radius
-        assert math.hypot(*foot.force[:2], foot.moment / radius) <= foot.grip + 1e-12
-
-
-@pytest.mark.parametrize('period', [0.0, -0.004, math.nan, math.inf])
-def test_bad_period(period):
-    with pytest.raises(InvalidInput, match=r'period = .* is not allowed: .* s is needed'):
-        robot_of(SHIPPED, period=period)

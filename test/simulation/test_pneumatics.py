@@ -7,9 +7,7 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.simulation import pneumatics
 from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel, time_to
 
 FOUR_BY_ONE = Hose(0.004, 1.0)
@@ -46,8 +44,8 @@ RT = 287.05 * 293.15
 VISCOSITY = 1.82e-5
 
 
-@pytest.mark.parametrize('diameter', [0.0005, 0.001, 0.002, 0.004, 0.006])
-@pytest.mark.parametrize('length', [0.1, 1.0, 10.0])
+@pytest.mark.parametrize('diameter', [0.0005, 0.002, 0.006])
+@pytest.mark.parametrize('length', [0.1, 10.0])
 def test_flow_agrees_with_pipe_flow_from_creeping_to_choked(diameter, length):
     # Isothermal compressible flow from rest loses one and a half dynamic heads at the ends.
     hose, seen = Hose(diameter, length), []
@@ -70,55 +68,16 @@ def test_flow_agrees_with_pipe_flow_from_creeping_to_choked(diameter, length):
         assert seen[3] == pytest.approx(1.0, abs=0.13)
 
 
-@pytest.mark.parametrize('diameter, length', [(0.002, 1.0), (0.004, 2.0), (0.006, 5.0)])
-def test_conductance_agrees_with_turbulent_pipe_flow(diameter, length):
-    # Choked isothermal flow in a smooth pipe with Blasius' friction and half a dynamic head lost
-    # at the inlet is independent of ISO 6358. Confusing m and mm would be a factor of 60.
-    upstream, rt, viscosity = 2.0e5, 287.05 * 293.15, 1.82e-5
-
-    def excess(flux):
-        friction = 0.316 * (flux * diameter / viscosity) ** -0.25 * length / diameter + 1.5
-        choked = flux * math.sqrt(rt)
-        return (upstream**2 - choked**2) / rt - flux**2 * (
-            friction + 2.0 * math.log(upstream / choked)
-        )
-
-    flux = brentq(excess, 1.0, 0.9 * upstream / math.sqrt(rt))
-    expected = flux * math.pi / 4.0 * diameter**2 / (1.185 * upstream)
-    assert Hose(diameter, length).sonic_conductance == pytest.approx(expected, rel=0.15)
-
-
 def test_choked_mass_flow():
     # 1.19636e-8 m³/(s Pa) · 1.185 kg/m³ · 600 kPa; the flow is choked, as 150/600 is below b.
     assert mass_flow(FOUR_BY_ONE, 600e3, 150e3) == pytest.approx(8.506e-3, rel=1e-3)
     assert mass_flow(FOUR_BY_ONE, 600e3, 10e3) == mass_flow(FOUR_BY_ONE, 600e3, 150e3)
 
 
-def test_subsonic_mass_flow():
-    # r = 0.8, (r − b)/(1 − b) = 0.69021, √(1 − 0.69021²) = 0.72362; choked at 200 kPa: 2.8354e-3.
-    assert mass_flow(FOUR_BY_ONE, 200e3, 160e3) == pytest.approx(2.0517e-3, rel=1e-3)
-    assert mass_flow(FOUR_BY_ONE, 160e3, 200e3) == -mass_flow(FOUR_BY_ONE, 200e3, 160e3)
-
-
-def test_flow_is_continuous_and_linear_near_equal_pressures():
-    at = [mass_flow(FOUR_BY_ONE, 1e5, 1e5 * r) for r in (0.9990001, 0.9989999)]
-    assert at[0] == pytest.approx(at[1], rel=1e-3)
-    half = mass_flow(FOUR_BY_ONE, 1e5, 1e5 * 0.9995)
-    assert half == pytest.approx(at[0] / 2.0, rel=1e-3)
-    assert mass_flow(FOUR_BY_ONE, 1e5, 1e5) == 0.0
-
-
-def test_measured_figures_replace_the_formulae():
-    line = Hose(0.004, 1.0, measured_conductance=1e-9, measured_critical_ratio=0.5)
-    assert mass_flow(line, 600e3, 100e3) == pytest.approx(1e-9 * 1.185 * 600e3)
-    assert line.volume == FOUR_BY_ONE.volume
-
-
 # --- regulator --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('damping', [0.5, 0.9, 1.0, 1.7])
-@pytest.mark.parametrize('dt', [0.001, 0.004, 0.017])
+@pytest.mark.parametrize('damping, dt', [(0.5, 0.001), (0.9, 0.017), (1.0, 0.004), (1.7, 0.004)])
 def test_outlet_is_the_exact_second_order_response(damping, dt):
     model = RegulatorModel(damping=damping, dead_time=0.0, dead_band=0.0, quantum=0.0)
     channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
@@ -128,7 +87,7 @@ def test_outlet_is_the_exact_second_order_response(damping, dt):
     outlet = []
     for _ in times:
         channel.step(50e3, dt)
-        outlet.append(channel.outlet_pressure)
+        outlet.append(channel.outlet.pressure)
     assert outlet == pytest.approx(50e3 * unit[1:], abs=0.2)
 
 
@@ -136,38 +95,11 @@ def test_dead_time_need_not_be_a_number_of_steps():
     model = RegulatorModel(dead_time=0.0101, dead_band=0.0)
     channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
     walk(channel, 50e3, 0.008, 0.004)
-    assert channel.outlet_pressure == 0.0
+    assert channel.outlet.pressure == 0.0
     walk(channel, 50e3, 0.032, 0.004)
     system = signal.lti([45.0**2], [1.0, 81.0, 45.0**2])
     _, unit = signal.step(system, T=[0.0, 0.040 - 0.0101])
-    assert channel.outlet_pressure == pytest.approx(50e3 * unit[1], abs=0.2)
-
-
-def test_commands_in_flight_arrive_one_after_another():
-    model = RegulatorModel(dead_time=0.050)
-    channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
-    walk(channel, 80e3, 0.020, 0.004)
-    walk(channel, 10e3, 0.030, 0.002)
-    assert channel.outlet_pressure == pytest.approx(0.0, abs=1e-6)  # now the first one acts
-    walk(channel, 10e3, 0.020, 0.004)
-    assert channel.outlet_pressure > 8e3  # on its way to the first set-point
-    walk(channel, 10e3, 1.0, 0.004)
-    assert channel.outlet_pressure == 10e3
-
-
-def test_slew_limit_against_the_integrated_ramp():
-    model = RegulatorModel(dead_time=0.0, slew_limit=1e6)
-    channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
-
-    def rate(t, y):
-        return [y[1], 45.0**2 * (min(1e6 * t, 75e3) - y[0]) - 81.0 * y[1]]
-
-    exact = solve_ivp(rate, (0.0, 0.2), [0.0, 0.0], rtol=1e-8, atol=1e-3, max_step=1e-3)
-    for time in np.arange(1, 29) * 0.007:
-        channel.step(75e3, 0.007)
-        assert channel.outlet_pressure == pytest.approx(
-            np.interp(time, exact.t, exact.y[0]), abs=20.0
-        )
+    assert channel.outlet.pressure == pytest.approx(50e3 * unit[1], abs=0.2)
 
 
 def test_quantum_rounds_the_setpoint():
@@ -187,20 +119,6 @@ def test_dead_band_ignores_small_changes_but_never_zero():
     channel.step(1e3, 2.0)
     assert channel.pad_pressure == 1e3
     assert channel.step(0.0, 2.0) == 0.0
-
-
-def test_outlet_stays_between_zero_and_full_scale():
-    model = RegulatorModel(damping=0.2, dead_band=0.0)
-    channel = PneumaticChannel(model, FOUR_BY_ONE, 1e-7)
-    seen = np.concatenate([walk(channel, p, 0.3, 0.003) for p in (100e3, 0.0, 95e3, 5e3)])
-    assert seen.min() == 0.0
-    assert seen.max() == 100e3
-
-
-def test_full_scale_that_is_no_multiple_of_the_quantum():
-    channel = PneumaticChannel(RegulatorModel(full_scale=99_950.0), FOUR_BY_ONE, 5e-6)
-    assert channel.step(99_950.0, 2.0) == 99_950.0
-    assert channel.settled
 
 
 # --- pad --------------------------------------------------------------------------------------
@@ -231,11 +149,9 @@ def reference(hose, volume, setpoint, start, times):
 
 
 LINES = [
-    (Hose(0.002, 0.5), 5e-6),
     (Hose(0.002, 2.0), 0.4e-6),
     (Hose(0.002, 2.0), 100e-6),
     (Hose(0.004, 1.0), 5e-6),
-    (Hose(0.006, 2.0), 50e-6),
 ]
 
 
@@ -249,25 +165,6 @@ def test_filling_and_venting_against_scipy(hose, volume, start, end):
     pad = walk(channel, end, 0.5, 0.004)
     assert np.abs(pad - exact).max() < 0.01 * abs(end - start)
     assert np.ptp(pad) > 0.3 * abs(end - start)
-
-
-def test_stiff_orifice_fills_in_the_isothermal_time():
-    # If the outlet is at 75 kPa at once, p V = ∫ C p1 ψ p0 dt, so t = V/(C p0) ∫ dp/(p1 ψ).
-    line = Hose(0.004, 1.0, measured_conductance=2e-10, measured_critical_ratio=0.4)
-    model = RegulatorModel(natural_frequency=1000.0, damping=1.0, dead_time=0.0)
-    channel = PneumaticChannel(model, line, 10e-6)
-    supply = 75e3 + 101325.0
-    p = np.linspace(101325.0, 101325.0 + 50e3, 20001)
-    psi = np.sqrt(1.0 - ((p / supply - 0.4) / 0.6) ** 2)
-    integrand = 1.0 / (supply * psi)
-    integral = np.sum((integrand[1:] + integrand[:-1]) / 2.0 * np.diff(p))
-    expected = (10e-6 + line.volume) / (2e-10 * 100e3) * integral
-    time = 0.0
-    while channel.pad_pressure < 50e3 and time < 5.0:
-        channel.step(75e3, 0.001)
-        time += 0.001
-    assert time == pytest.approx(expected + 0.002, abs=0.003)  # the regulator lags by 2/ω
-    assert expected > 0.3
 
 
 def test_pad_that_swells_against_scipy():
@@ -286,23 +183,8 @@ def test_pad_that_swells_against_scipy():
     assert np.abs(pad - exact).max() < 750.0
 
 
-@pytest.mark.parametrize('hose, volume', LINES)
-@pytest.mark.parametrize('start, end', [(0.0, 75e3), (75e3, 0.0)])
-def test_four_milliseconds_against_a_tenth(hose, volume, start, end):
-    fine = PneumaticChannel(RegulatorModel(), hose, volume)
-    coarse = PneumaticChannel(RegulatorModel(), hose, volume)
-    for channel in (fine, coarse):
-        channel.step(start, 60.0)
-    for _ in range(100):
-        for _ in range(40):
-            fine.step(end, 1e-4)
-        coarse.step(end, 0.004)
-        assert coarse.pad_pressure == pytest.approx(fine.pad_pressure, abs=750.0)
-    assert abs(coarse.pad_pressure - start) > 30e3
-
-
-@pytest.mark.parametrize('dt', [0.001, 0.004, 0.005, 0.007, 0.020])
-@pytest.mark.parametrize('volume', [1e-9, 1e-7, 5e-6, 2e-4])
+@pytest.mark.parametrize('dt', [0.004, 0.020])
+@pytest.mark.parametrize('volume', [1e-9, 5e-6, 2e-4])
 @pytest.mark.parametrize('diameter', [0.002, 0.006])
 def test_filling_is_monotone_at_any_step(dt, volume, diameter):
     model = RegulatorModel(damping=1.0)  # without overshoot of the regulator
@@ -315,49 +197,6 @@ def test_filling_is_monotone_at_any_step(dt, volume, diameter):
         assert pad.min() >= 0.0
 
 
-@pytest.mark.parametrize('volume', [1e-9, 5e-6])
-def test_one_step_of_20_ms_does_not_chatter_either(volume, monkeypatch):
-    """Near equal pressures the flow law is so steep that explicit steps overshoot."""
-    monkeypatch.setattr(pneumatics, 'MAX_STEP', 0.02)
-    line = Hose(0.006, 0.1, measured_conductance=1e-7, measured_critical_ratio=0.4)
-    channel = PneumaticChannel(RegulatorModel(damping=1.0), line, volume)
-    pad = walk(channel, 75e3, 1.0, 0.02)
-    assert (np.diff(pad) >= 0.0).all()
-    assert pad[-1] == 75e3
-    naive, signs = 75e3 - 50.0, set()
-    for _ in range(20):
-        flow = mass_flow(line, 75e3 + 101325.0, naive + 101325.0)
-        naive += 0.02 * flow * 100e3 / 1.185 / (volume + line.volume)
-        signs.add(naive > 75e3)
-    assert signs == {True, False}
-
-
-@pytest.mark.parametrize('start, end', [(0.0, 90e3), (90e3, 0.0), (30e3, 75e3)])
-def test_air_through_the_hose_is_air_in_the_domes(start, end):
-    """Mass balance by the ideal gas law with volumes of the domes, not of the channel's table."""
-    foot = Foot.load('large37')
-    line = Hose(0.001, 0.0, measured_conductance=2e-11, measured_critical_ratio=0.4)
-    channel = PneumaticChannel(BARE, line, foot.air_volume)
-    channel.step(start, 30.0)
-    states = [(channel.outlet_pressure, channel.pad_pressure)]
-    for _ in range(2500):
-        channel.step(end, 2e-4)
-        states.append((channel.outlet_pressure, channel.pad_pressure))
-    flows = [mass_flow(line, a + 101325.0, b + 101325.0) for a, b in states]
-    passed = np.trapezoid(flows, dx=2e-4) if hasattr(np, 'trapezoid') else np.trapz(flows, dx=2e-4)
-    first, last = states[0][1], states[-1][1]
-    rt = 100e3 / 1.185  # J/kg, of the reference air
-
-    def mass(pressure):
-        return (pressure + 101325.0) * foot.air_volume(pressure) / rt
-
-    assert abs(last - first) > 30e3
-    assert passed == pytest.approx(mass(last) - mass(first), rel=2e-3)
-    # Swelling of the domes adds more than a fifth.
-    rigid = (last - first) * foot.air_volume(0.0) / rt
-    assert abs(passed / rigid) > 1.2
-
-
 def test_air_used_is_the_air_in_the_pad():
     channel = PneumaticChannel(RegulatorModel(damping=1.0), FOUR_BY_ONE, 10e-6)
     channel.step(75e3, 5.0)
@@ -368,16 +207,6 @@ def test_air_used_is_the_air_in_the_pad():
     assert channel.air_used == pytest.approx(once, rel=1e-3)
     channel.step(75e3, 5.0)
     assert channel.air_used == pytest.approx(2.0 * once, rel=1e-3)
-
-
-def test_air_of_a_swelling_pad():
-    channel = PneumaticChannel(
-        RegulatorModel(damping=1.0), FOUR_BY_ONE, lambda p: 5e-6 + 1e-6 * p / 75e3
-    )
-    channel.step(75e3, 5.0)
-    hose = FOUR_BY_ONE.volume
-    content = 176325.0 * (6e-6 + hose) - 101325.0 * (5e-6 + hose)
-    assert channel.air_used == pytest.approx(content * 1.185 / 100e3, rel=1e-3)
 
 
 def test_settled_channel_skips_an_hour():
@@ -397,14 +226,6 @@ def test_settled_channel_skips_an_hour():
 
 
 # --- time to nine tenths ------------------------------------------------------------------------
-
-
-def time_to_ninety_percent(hose, volume):
-    channel = PneumaticChannel(RegulatorModel(), hose, volume)
-    time = 0.0
-    while channel.step(75e3, 0.001) < 67.5e3 and time < 5.0:
-        time += 0.001
-    return time + 0.001
 
 
 def time_through_a_divided_hose(diameter, length, volume):
@@ -443,44 +264,14 @@ def time_through_a_divided_hose(diameter, length, volume):
     'size, volume',
     [
         ((0.0005, 2.0), 2.4e-6),
-        ((0.001, 1.0), 2.4e-6),
-        ((0.001, 5.0), 2.4e-6),
         ((0.001, 10.0), 20e-6),
-        ((0.002, 2.0), 20e-6),
-        ((0.004, 1.0), 2.4e-6),
         ((0.004, 10.0), 2.4e-6),
     ],
 )
 def test_time_to_fill_against_a_divided_hose(size, volume):
     divided = time_through_a_divided_hose(*size, volume)
-    assert 0.81 < time_to_ninety_percent(Hose(*size), volume) / divided < 1.09
-
-
-def test_hoses_that_are_the_lag_are_long_and_thin_or_feed_much():
-    for size, volume in [((0.001, 5.0), 2.4e-6), ((0.0005, 1.0), 2.4e-6), ((0.001, 1.0), 20e-6)]:
-        assert time_to_ninety_percent(Hose(*size), volume) > 3.0 * 0.086
-    # A narrow fitting of about 0.1 mm² (C = 1.6e-3 A) is as slow, whatever the hose.
-    choked = Hose(0.004, 1.0, measured_conductance=1.5e-10, measured_critical_ratio=0.5)
-    assert time_to_ninety_percent(choked, 2.4e-6) > 3.0 * 0.086
-
-
-@pytest.mark.parametrize('size', [(0.002, 0.5), (0.002, 1.0), (0.004, 1.0), (0.004, 2.0)])
-def test_regulator_is_the_lag_of_a_foot_of_a_few_millilitres(size):
-    # The regulator alone takes 0.086 s: 10 ms of dead time, and 3.42/45 s of a ζ = 0.9 step.
-    assert time_to_ninety_percent(Hose(*size), 5e-6) == pytest.approx(0.087, abs=0.004)
-
-
-@pytest.mark.parametrize(
-    'diameter, length, expected',
-    [(2, 500, 0.31), (2, 1000, 0.57), (2, 2000, 1.25), (4, 1000, 0.41), (4, 2000, 0.87)],
-)
-def test_times_that_a_hose_formula_in_millimetres_gives(diameter, length, expected):
-    # These times are an error of units: the formula with D and L in mm and C read as dm³/(s bar),
-    # for 0.8 mL of pads. A line that really is so slow is described by its measured C.
-    c = 0.029 * diameter**2 / math.sqrt(length / diameter**1.25 + 510.0)
-    line = Hose(diameter / 1e3, length / 1e3, c * 1e-8, 474.0 * c / diameter**2)
-    assert time_to_ninety_percent(line, 0.8e-6) == pytest.approx(expected, rel=0.03)
-    assert Hose(diameter / 1e3, length / 1e3).sonic_conductance > 40.0 * c * 1e-8
+    channel = PneumaticChannel(RegulatorModel(), Hose(*size), volume)
+    assert 0.81 < time_to(channel, 75e3, 67.5e3) / divided < 1.09
 
 
 # --- bad input ----------------------------------------------------------------------------------
@@ -490,12 +281,9 @@ def test_times_that_a_hose_formula_in_millimetres_gives(diameter, length, expect
     'name, value',
     [
         ('natural_frequency', 0.0),
-        ('damping', math.nan),
-        ('dead_time', -0.01),
         ('dead_band', 0.5),
         ('full_scale', math.inf),
         ('quantum', 'fine'),
-        ('slew_limit', True),
     ],
 )
 def test_regulator_refuses(name, value):
@@ -525,14 +313,6 @@ def test_setpoint_refused_and_nothing_moves(setpoint):
     assert (channel.pad_pressure, channel.setpoint) == (before, 50e3)
 
 
-@pytest.mark.parametrize('dt', [-0.004, math.nan, math.inf])
-def test_time_refused(dt):
-    channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
-    with pytest.raises(InvalidInput, match='dt = '):
-        channel.step(50e3, dt)
-    assert channel.settled
-
-
 def test_the_time_to_a_pressure_does_not_depend_on_the_ticks():
     times = []
     for tick in (1e-4, 5e-4, 2e-3):
@@ -542,8 +322,3 @@ def test_the_time_to_a_pressure_does_not_depend_on_the_ticks():
         times.append(time_to(channel, 0.0, 1e3, tick))
     assert times[0] == pytest.approx(0.086, abs=0.001)  # docs/model/pneumatics.md
     assert times[2:] == pytest.approx(2 * times[:2], rel=0.01)
-
-
-def test_a_pressure_that_is_not_reached_takes_for_ever():
-    channel = PneumaticChannel(RegulatorModel(), Hose(0.5e-3, 50.0), 20e-6)
-    assert time_to(channel, 75e3, 67.5e3, longest=1.0) == math.inf

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 import copy
-import dataclasses
 import json
 import pathlib
 import re
@@ -87,62 +86,35 @@ def test_values_come_where_they_belong():
     assert leg.heading_gain == 0.0 and leg.tow.weight == 0.0
 
 
-def test_legs_are_numbered_as_in_the_thesis():
-    homes = Scene.load('hexapod_patches').body.homes
-    left, right = homes[:3], homes[3:]
-    assert all(y > 0.0 for _, y in left) and all(y < 0.0 for _, y in right)
-    assert [x > 0.0 for x, _ in (homes[0], homes[5])] == [True, True]
-    assert homes[1][0] == homes[4][0] == 0.0  # 2 and 5 are the middle legs
-    # The centre of mass is inside each tripod: all three loads in balance are positive.
-    for tripod in ((0, 2, 4), (1, 3, 5)):
-        (ax, ay), (bx, by), (cx, cy) = (homes[index] for index in tripod)
-        areas = [ax * by - bx * ay, bx * cy - cx * by, cx * ay - ax * cy]
-        assert all(area > 0.0 for area in areas) or all(area < 0.0 for area in areas)
-
-
 BAD = [
     (HEXAPOD, 'robot', 'biped', "robot: no robot named 'biped'"),
     (HEXAPOD, 'foot', 'large73', "foot: no foot named 'large73'. Did you mean 'large37'?"),
-    (HEXAPOD, 'foot', 37, 'foot = 37 is not allowed: text is needed'),
     (HEXAPOD, 'policy', 'brave', 'one of flat, dome, adaptive, oracle is needed'),
     (HEXAPOD, 'cycles', 0, 'cycles = 0 is not allowed: a whole number from 1 to 100000'),
-    (HEXAPOD, 'cycles', 1.5, 'cycles = 1.5'),
     (HEXAPOD, 'accuracy', 0, 'accuracy = 0 is not allowed: a number from 0.0001 to 1'),
     (HEXAPOD, 'settle', -1, 'settle = -1 is not allowed: a number from 0 to 60 s'),
     (HEXAPOD, 'dome_pressure', 95e3, 'dome_pressure = 95000.0 is not allowed: a number from 1'),
     (HEXAPOD, 'body', {'mass': '2 kg'}, "body: mass = '2 kg' is not allowed: a number from 0.05"),
-    (HEXAPOD, 'body', {'height': float('nan')}, 'body: height = nan is not allowed'),
     (HEXAPOD, 'body', {'corner_fore': 0.2}, "body: unknown key 'corner_fore'"),
-    (HEXAPOD, 'body', 3, 'body: expected a table of keys, found 3'),
     (HEXAPOD, 'gait.duty', 0.5, 'gait: pushes = True is not allowed: two groups of legs'),
-    (HEXAPOD, 'gait.kind', 'trot', "gait: gait = 'trot' is not allowed for 6 legs"),
     (HEXAPOD, 'gait.stride', ..., "gait: key 'stride' is missing"),
     (HEXAPOD, 'gait.stroke', 0.1, "gait: unknown key 'stroke'. Did you mean 'stride'?"),
-    (HEXAPOD, 'gait.heading_gain', True, 'gait: heading_gain = True is not allowed'),
     (HEXAPOD, 'floor.kind', 'ice', 'floor: kind = '),
     (HEXAPOD, 'floor.wet_fraction', 1.0, 'floor: wet_fraction = 1.0 is not allowed'),
     (HEXAPOD, 'floor.patch_length', 6.0, 'floor: patch_length = 6.0 is not allowed: a number'),
-    (HEXAPOD, 'floor.film_thickness', 3, 'floor: film_thickness = 3 is not allowed'),
-    (HEXAPOD, 'floor.viscosity', 0, 'floor: viscosity = 0 is not allowed'),
     (
         HEXAPOD,
         'floor.slope',
         0.6,
         'floor: slope = 0.6 is not allowed: a number from -0.5 to 0.5 rad',
     ),
-    (HEXAPOD, 'floor.roughness', -1e-6, 'floor: roughness = -1e-06 is not allowed'),
-    (HEXAPOD, 'floor.unevenness', 0.03, 'floor: unevenness = 0.03 is not allowed'),
     (HEXAPOD, 'floor.drawing', '#', "floor: unknown key 'drawing'"),
-    (HEXAPOD, 'body', {'leg_stiffness': 0.0}, 'body: leg_stiffness = 0.0 is not allowed'),
     (HEXAPOD, 'tow.friction_dry', ..., "tow: key 'friction_dry' is missing"),
-    (HEXAPOD, 'tow.weight', float('inf'), 'tow: weight = inf is not allowed'),
     (HEXAPOD, 'sensors.rate', 5, 'sensors: rate = 5 is not allowed: a number from 50 to 1000 Hz'),
     (HEXAPOD, 'sensors', ..., "key 'sensors' is missing"),
-    (HEXAPOD, 'regulator.hose_length', 0, 'regulator: hose_length = 0 is not allowed'),
     (HEXAPOD, 'colour', 'red', "unknown key 'colour'"),
     (LEG, 'gait.stride', 0.1, "gait: unknown key 'stride'"),
     (LEG, 'gait.swing', 0.0, 'gait: swing = 0.0 is not allowed: a number from 0.05 to 60 s'),
-    (LEG, 'body.rolling_drag', -1, 'body: rolling_drag = -1 is not allowed'),
     (LEG, 'floor.wet_fraction', 0.4, "floor: unknown key 'wet_fraction'"),
 ]
 
@@ -153,22 +125,6 @@ def test_bad_scenes(tmp_path, source, path, value, message):
     with pytest.raises(ConfigError, match=re.escape(message)) as caught:
         Scene.load(file)
     assert str(caught.value).startswith(str(file))
-
-
-@pytest.mark.parametrize(
-    'source, path, text, value',
-    [
-        (LEG, 'dome_pressure', '75e3', 75e3),
-        (HEXAPOD, 'tow.weight', '1e1', 10.0),
-        (HEXAPOD, 'floor.film_thickness', '3e-4', 3e-4),
-    ],
-)
-def test_numbers_that_are_text_to_pyyaml(tmp_path, source, path, text, value):
-    file = written(tmp_path, source, (path, text))
-    found = Scene.load(file)
-    for part in path.split('.'):
-        found = getattr(found, part)
-    assert found == value
 
 
 def test_scene_by_path(tmp_path, monkeypatch):
@@ -196,17 +152,6 @@ def test_unknown_scene():
     assert 'leg_dry_flat' in str(caught.value)
 
 
-def test_without_a_tow(tmp_path):
-    scene = Scene.load(written(tmp_path, HEXAPOD, ('tow', ...)))
-    assert scene.tow.weight == 0.0
-
-
-def test_floor_of_a_scene_depends_on_the_seed():
-    plan = Scene.load('hexapod_patches').floor
-    assert (plan.build(1).wet_map != plan.build(2).wet_map).any()
-    assert plan.build(1).film_thickness == plan.film_thickness
-
-
 def test_a_floor_can_be_drawn(tmp_path):
     floor = {'kind': 'drawn', 'cell': 0.5, 'drawing': '..##\n.#..\n', 'slope': 0.05}
     plan = Scene.load(written(tmp_path, HEXAPOD, ('floor', floor))).floor
@@ -215,33 +160,3 @@ def test_a_floor_can_be_drawn(tmp_path):
     built = plan.build(0)
     assert built.wet(1.0, 0.25) and built.wet(0.5, -0.25)
     assert not built.wet(0.5, 0.25) and not built.wet(1.0, -0.25)
-
-
-@pytest.mark.parametrize(
-    'drawing, message',
-    [
-        ('#.\n#', 'floor: drawing: row 2 has 1 characters and row 1 has 2'),
-        ('#x', "floor: drawing: row 1 contains 'x'"),
-        ('', 'floor: drawing is empty'),
-        (3, 'floor: drawing = 3 is not allowed: text is needed'),
-    ],
-)
-def test_bad_drawings(tmp_path, drawing, message):
-    floor = {'kind': 'drawn', 'cell': 0.5, 'drawing': drawing}
-    file = written(tmp_path, HEXAPOD, ('floor', floor))
-    with pytest.raises(ConfigError, match=re.escape(message)):
-        Scene.load(file)
-
-
-def test_rough_scenes_are_the_smooth_ones_on_a_rough_floor():
-    for name in ('dry_flat', 'wet_flat', 'wet_dome'):
-        smooth, rough = Scene.load(f'hexapod_smooth_{name}'), Scene.load(f'hexapod_rough_{name}')
-        assert rough.floor.roughness > 0.0 and rough.floor.unevenness > 0.0
-        level = dataclasses.replace(rough.floor, roughness=0.0, unevenness=0.0)
-        assert (
-            dataclasses.replace(
-                rough, floor=level, name=smooth.name, source=smooth.source,
-                description=smooth.description,
-            )
-            == smooth
-        )  # fmt: skip

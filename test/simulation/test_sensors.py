@@ -4,7 +4,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ros_pad.records import SAMPLE
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.robot import FootState, Proprioception, contacts_of
 from ros_pad.simulation.scene import Scene, SensorNoise
@@ -53,25 +52,10 @@ def test_noise_is_white_and_as_wide_as_asked_for():
     assert np.abs((flat[1000:] * flat[:-1000]).mean(axis=0)).max() < 0.08
 
 
-def test_seeds():
-    assert np.array_equal(read(seed=5, count=50), read(seed=5, count=50))
-    assert not np.array_equal(read(seed=5, count=50), read(seed=6, count=50))
-
-
 def test_without_noise_the_truth():
     samples = read(SensorNoise(250.0, 0.0, 0.0), count=3)
     assert (samples[:, 0, 0] == [1.0, -2.0, 7.0]).all()
     assert (samples[:, 1, 1] == [0.1, 0.2, 0.3]).all()
-
-
-def test_a_sample_has_no_velocity_and_keeps_its_values():
-    sensors = Sensors(NOISE, 2, 0)
-    rows = [sensors.sample(Statue()) for _ in range(1001)]
-    copies = [each.copy() for each in rows]
-    sensors.sample(Statue())
-    assert rows[0].dtype == SAMPLE.dtype and rows[0].shape == (2,)
-    assert np.isnan(rows[0]['velocity']).all() and np.isnan(rows[0]['variance']).all()
-    assert [each.tobytes() for each in rows] == [each.tobytes() for each in copies]
 
 
 def test_moments_are_read_where_they_are_measured():
@@ -82,11 +66,6 @@ def test_moments_are_read_where_they_are_measured():
     moments = np.array([sensors.sample(statue)['moment'] for _ in range(5000)])
     assert moments.mean(axis=0) == pytest.approx([0.03, -0.01], abs=5 * 5e-4 / 5000**0.5)
     assert moments.std(axis=0) == pytest.approx([5e-4, 5e-4], rel=0.05)
-
-
-def test_a_moment_leaves_the_other_readings_as_they_are():
-    """Reading moments must not change the noise of other readings."""
-    assert np.array_equal(read(WITH_MOMENTS, count=50), read(count=50))
 
 
 @pytest.mark.parametrize('kind', ['force_dead', 'force_frozen'])
@@ -132,20 +111,6 @@ def test_faults_are_in_what_is_read_and_end(kind):
         assert before[0][0] == pytest.approx(held, abs=1e-8)
         assert before[0][1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
         assert before[1][0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
-
-
-def test_a_frozen_marker_leaves_the_force():
-    sensors = Sensors(NOISE, 2, 0, [(), (Fault('marker_frozen', 0.5),)])
-    statue = Statue()
-    read = []
-    for number in range(250):
-        statue.time = number / 250.0
-        statue.feet[1].position = (0.01 * number, 0.0, 0.0)
-        read.append(both(sensors.sample(statue)))
-    different = [
-        [len(np.unique(each, axis=0)) for each in foot] for foot in np.moveaxis(read, 0, 2)
-    ]
-    assert different == [[250, 250], [250, 125]]
 
 
 # --- IMU and joints ---------------------------------------------------------------------------
@@ -201,13 +166,6 @@ def test_body_sensors_repeat_with_their_seed():
         for seed in (3, 4)
     ]
     assert np.linalg.norm(biases[0] - biases[1]) > 0.002  # directions differ
-
-
-def test_noise_of_imu_and_joints_leaves_that_of_forces_alone():
-    quiet = dataclasses.replace(LOUD, gyro=1e-6, encoder=1e-6)
-    assert [rows for *_, rows in bits(body_readings(count=50))] == [
-        rows for *_, rows in bits(body_readings(count=50, noise=quiet))
-    ]
 
 
 def test_silent_imu_and_joints_and_dead_forces():

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated walks agree with what the thesis reports of its walks (5.2 and 5.3)."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from ros_pad.simulation import Scene
 from ros_pad.trials import run
 
 LEG_SCENES = (
@@ -54,11 +52,6 @@ def test_dome_on_wet_ground_is_quite_similar_to_flat_on_dry_ground(goal_times):
     assert 1.0 <= goal_times['leg_wet_dome_75'] / goal_times['leg_dry_flat'] < 1.15
 
 
-@pytest.mark.slow
-def test_seed_does_not_move_the_leg(goal_times):
-    assert time_to_goal('leg_wet_flat', seed=1) == goal_times['leg_wet_flat']
-
-
 def test_dry_leg_advances_by_its_stroke():
     cycles = 70
     trial = run('leg_dry_flat')
@@ -85,29 +78,15 @@ def test_slipping_leg_advances_as_its_forces_say():
     assert trial.metrics.distance_per_cycle_m == pytest.approx(distance, rel=0.01)
 
 
-@pytest.mark.slow
-def test_domes_are_overloaded_below_their_force_limit():
-    """The thesis measured 0.30 N a pad at 75 kPa; its line gives 0.10 N at 60, none at 40 kPa."""
-    load_per_pad = 2.5 / 19
-    assert 0.10 < load_per_pad < 0.30
-    stance_time = 70 * 0.5
-    assert run('leg_wet_dome_40').metrics.overload_s[0] > stance_time
-    assert run('leg_wet_dome_60').metrics.overload_s[0] > stance_time
-    assert run('leg_wet_dome_75').metrics.overload_s[0] < 0.1  # only while pads fill
-
-
 NAMES = ('dry_flat', 'wet_flat', 'wet_dome')
 
 
-KINDS = [pytest.param(kind, marks=pytest.mark.slow) for kind in ('smooth', 'rough')]
-
-
-@pytest.fixture(scope='module', params=KINDS)
-def walks(request):
-    """Return walks on three floors of one kind, with joints and servos (L2), by scene."""
+@pytest.fixture(scope='module')
+def walks():
+    """Return walks on three rough floors, with joints and servos (L2), by scene."""
     pytest.importorskip('mujoco')
     return {
-        name: [run(f'hexapod_{request.param}_{name}', seed=seed, fidelity='L2') for seed in SEEDS]
+        name: [run(f'hexapod_rough_{name}', seed=seed, fidelity='L2') for seed in SEEDS]
         for name in NAMES
     }
 
@@ -130,30 +109,10 @@ def test_walks_are_valid(walks):
     assert [trial.metrics.verdict for name in NAMES for trial in walks[name]] == [None] * 9
 
 
-def test_dry_hexapod_reaches_its_distance(walks):
-    """Thesis 5.3: "robust performance in both smooth and rough terrains", "no signs of slippage".
-
-    At touch-down feet scuff a few millimetres in a stride of 120 mm.
-    """
-    for trial in walks['dry_flat']:
-        assert trial.metrics.distance_per_cycle_m == pytest.approx(0.12, rel=0.05)
-        assert max(trial.metrics.slip_path_m) / trial.metrics.cycles < 0.1 * 0.12
-        assert bend(trial) < 0.01
-
-
 def test_middle_legs_slip_on_wet_ground_and_domes_help(walks):
     """Thesis 5.3, figures 41 and 42: legs 2 and 5 slip with flat pads, much less with domes."""
     assert middle_slip(walks, 'wet_flat') > 3.0 * middle_slip(walks, 'dry_flat')
     assert middle_slip(walks, 'wet_flat') > 2.0 * middle_slip(walks, 'wet_dome')
-
-
-def test_middle_legs_slip_more_than_the_others(walks):
-    """Thesis 5.3: "legs 2 and 5 carry a higher risk of slipping": true where feet mostly stick."""
-    for name in ('dry_flat', 'wet_dome'):
-        every = np.mean(
-            [np.sum(t.metrics.slip_path_m) / 6 / t.metrics.cycles for t in walks[name]]
-        )
-        assert middle_slip(walks, name) > 1.1 * every
 
 
 def test_wet_flat_hexapod_struggles_and_deviates(walks):
@@ -170,30 +129,3 @@ def test_wet_dome_hexapod_is_like_the_dry_one(walks):
         assert wet.metrics.distance_per_cycle_m == pytest.approx(ahead, rel=0.03)
         assert bend(wet) < 0.02
         assert max(wet.metrics.overload_s) < 0.15 * wet.metrics.duration_s
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('kind', KINDS)
-def test_in_the_plane_the_thesis_statements_hold_too(kind):
-    """L1 has no servos and no scuffing: a walk slips and bends clearly, or not at all."""
-    trials = {
-        name: [run(f'hexapod_{kind}_{name}', seed=seed, fidelity='L1') for seed in SEEDS]
-        for name in NAMES
-    }
-    for name, slips in (('dry_flat', False), ('wet_flat', True), ('wet_dome', False)):
-        for trial in trials[name]:
-            per_cycle = np.array(trial.metrics.slip_path_m) / trial.metrics.cycles
-            assert trial.metrics.verdict is None
-            assert (per_cycle > 0.01).all() if slips else (per_cycle < 1e-3).all()
-            assert (bend(trial) > 0.01) if slips else (bend(trial) < 1e-3)
-            ahead = trial.metrics.distance_per_cycle_m
-            assert ahead < 0.8 * 0.12 if slips else ahead == pytest.approx(0.12, rel=0.01)
-
-
-def test_a_floor_wet_all_over_slows_but_does_not_turn():
-    """A robot deviates only if ground differs from side to side, as in the thesis' tests."""
-    scene = Scene.load('hexapod_smooth_wet_flat')
-    floor = dataclasses.replace(scene.floor, kind='wet')
-    walk = run(dataclasses.replace(scene, floor=floor), fidelity='L1').metrics
-    assert walk.distance_per_cycle_m < 0.8 * 0.12
-    assert abs(walk.lateral_drift_m) < 1e-3

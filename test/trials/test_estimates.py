@@ -13,8 +13,6 @@ from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
 from studies.closed_loop import loops
-from studies.work_precision.estimator.priors import Condition, updates
-from studies.work_precision.estimator.priors import walked as walked_on
 
 PERIOD = 0.004  # s
 LATE = 15  # samples after a slip in which an alarm still counts for the slip
@@ -101,19 +99,3 @@ def test_wet_and_dry_are_distinguished_at_the_end_of_a_flat_stance(walks):
                     right.append((walk['wetness'][last, foot] > 0.5) == wet)
     assert len(right) > 300
     assert np.mean(right) >= 0.97
-
-
-def test_the_true_friction_is_where_it_is_expected_on_floors_that_the_foot_file_does_not_have():
-    """Friction differs from the file by a factor, and by 10 % from place to place. After half a
-    minute the interval of 95 % holds it so often, and a margin errs in one case of twenty."""
-    walk = walked_on(Condition('', dry=1.0 / 1.4, wet=1.4), 'flat', 60, duration=60)
-    seen = [
-        (*estimator.ground.quantiles([0.025, 0.05, 0.975]), friction)
-        for time, *_, friction, estimator in updates(walk, learns=True)
-        if time > 30.0
-    ]
-    low, least, high, true = np.array(seen).T
-    assert len(true) > 1500
-    assert 0.90 <= np.mean((low <= true) & (true <= high)) <= 0.98
-    assert 0.02 <= np.mean(true < least) <= 0.09
-    assert np.mean(high - low) < 0.5

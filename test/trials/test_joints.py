@@ -2,22 +2,18 @@
 """Walks without markers in the loop without ROS: settings, refusals, and where feet are."""
 
 import dataclasses
-import json
 import math
 
 import numpy as np
 import pytest
 
 pytest.importorskip('mujoco')
-from ros_pad import cli, trials
-from ros_pad.errors import InvalidInput
+from ros_pad import trials
 from ros_pad.estimation import doubt
-from ros_pad.simulation import fidelity
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
-from ros_pad.trials.node_settings import body_settings_for, tuning_for
 from ros_pad.trials.trial import Trial
 
 PATCHES = Scene.load('hexapod_patches')
@@ -30,48 +26,6 @@ def test_the_same_seed_gives_the_same_walk_and_another_one_other_noise():
         assert np.array_equal(getattr(one, series), getattr(same, series)), series
     assert not np.array_equal(one.odom, other.odom)
     assert one.settings['sensing'] == 'joints'
-
-
-def test_the_true_distance_counts():
-    """Flat feet decide nothing, so that both walks are the same but for what is estimated."""
-    markers = trials.run(SHORT, 'flat', 3, 'L2')
-    joints = trials.run(SHORT, 'flat', 3, sensing='joints')
-    assert joints.metrics.distance_m == markers.metrics.distance_m
-    assert joints.metrics.slip_path_m == markers.metrics.slip_path_m
-    assert joints.odom[-1, 0] != joints.body[-1, 0]
-    assert markers.odom.shape == (0, 3)
-    assert markers.settings['sensing'] == 'markers'
-
-
-def test_settings_of_a_scene():
-    loud = dataclasses.replace(
-        PATCHES, sensors=dataclasses.replace(PATCHES.sensors, gyro=0.02, encoder=1e-3, moment=5e-4)
-    )
-    values = body_settings_for(loud)
-    assert (values['gyro_noise'], values['encoder_noise']) == (0.02, 1e-3)
-    assert values['accelerometer_noise'] == pytest.approx(math.hypot(0.05, 0.3))
-    tuning = tuning_for(loud, 'joints')
-    assert (tuning.source, tuning.pads_shear, tuning.moment_noise) == ('joints', False, 0.0)
-    assert tuning_for(loud).moment_noise == 5e-4
-    assert tuning_for(loud).source == 'markers'
-    with pytest.raises(InvalidInput, match=r"sensing = 'eyes'.*markers, joints"):
-        trials.run(SHORT, sensing='eyes')
-
-
-def test_levels():
-    assert fidelity.level(PATCHES, 'auto', joints=True) == 'L2'
-    for level in ('L0', 'L1'):
-        with pytest.raises(InvalidInput, match=level):
-            fidelity.level(PATCHES, level, joints=True)
-    with pytest.raises(InvalidInput, match='leg_dry_flat'):
-        fidelity.level(Scene.load('leg_dry_flat'), joints=True)
-
-
-def test_feet_of_a_lighter_robot_than_its_file_stand():
-    assert body_settings_for(PATCHES)['contact_share'] == 0.0
-    body = dataclasses.replace(PATCHES.body, mass=0.5 * PATCHES.body.mass)
-    light = body_settings_for(dataclasses.replace(PATCHES, body=body))
-    assert light['contact_share'] == pytest.approx(0.05)
 
 
 def test_a_quadruped_is_sensed_by_its_joints():
@@ -129,14 +83,3 @@ def test_feet_in_odom_move_to_the_world():
     # 0.2 m ahead of the body and 0.1 m to its left, where ahead is y.
     assert trial.position[0, 0] == pytest.approx([1.9, 4.2, -0.14])
     assert trial.force[0, 0] == pytest.approx([0.0, 1.0, 5.0])
-
-
-def test_the_command_line(tmp_path, capsys):
-    out = tmp_path / 'walk'
-    words = ['run', 'hexapod_patches', '--sensing', 'joints', '--cycles', '1', '--no-ros']
-    assert cli.main([*words, '--policy', 'flat', '--json', '--out', str(out)]) == 0
-    assert json.loads(capsys.readouterr().out)['sensing'] == 'joints'
-    assert 'sensing joints' in (out / 'report.html').read_text()
-    assert cli.main([*words, '--fidelity', 'L1', '--out', str(tmp_path / 'other')]) == 2
-    assert "'joints' is not allowed with fidelity = 'L1'" in capsys.readouterr().err
-    assert not (tmp_path / 'other').exists()

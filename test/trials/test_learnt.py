@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import dataclasses
 import math
 
 import pytest
@@ -56,10 +55,6 @@ def test_all_policies_of_a_run_begin_with_it(file, tmp_path, monkeypatch):
     assert found == [Scale(1.2, pytest.approx(math.hypot(0.2, 0.1)))]
 
 
-def test_what_was_less_certain_than_before_a_walk_stays_so(file):
-    assert learnt.load(file(GOOD.replace('0.4', '0.9')), 'large37')['scale_sd.dome'] == 0.9
-
-
 @pytest.mark.parametrize(
     ('scale', 'sd', 'scale_error', 'sd_error'),
     # Where scales end, half of the distribution remains.
@@ -75,12 +70,6 @@ def test_what_is_saved_is_what_is_known(tmp_path, scale, sd, scale_error, sd_err
     assert kept['dome']['sd'] > 0.5
     assert learnt.load(path, 'large37')['scale.flat_dry'] == kept['flat_dry']['scale']
     assert [each.name for each in tmp_path.iterdir()] == ['new.yaml']
-
-
-def test_the_name_of_a_foot_may_have_quotes(tmp_path):
-    foot = dataclasses.replace(FOOT, source="it's: a {foot}.yaml")
-    learnt.save(tmp_path / 'a', learnt.settings_of(shared_friction(foot, 6.83, Tuning())), foot)
-    assert learnt.load(tmp_path / 'a', foot.source)
 
 
 @pytest.mark.parametrize(
@@ -99,11 +88,3 @@ def test_a_wrong_file_gets_an_error_that_names_it(file, old, new, words):
     with pytest.raises(ConfigError) as caught:
         learnt.load(file(GOOD.replace(old, new)), 'large37')
     assert 'learnt.yaml' in str(caught.value) and words in str(caught.value)
-
-
-def test_no_file_and_no_place_for_one(tmp_path):
-    with pytest.raises(ConfigError, match='cannot be read'):
-        learnt.load(tmp_path / 'none.yaml', 'large37')
-    with pytest.raises(PadError, match='cannot be written'):
-        learnt.save(tmp_path / 'none' / 'a', learnt.settings_of(
-            shared_friction(FOOT, 6.83, Tuning())), FOOT)  # fmt: skip

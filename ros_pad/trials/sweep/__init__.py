@@ -8,6 +8,6 @@ folder, so that a killed sweep can continue where it stopped. At the end the swe
 
 from ros_pad.trials.sweep.execution import run
 from ros_pad.trials.sweep.plan import Job, Row, Sweep, Value
-from ros_pad.trials.sweep.summary import Found, Point, is_sweep, points, read
+from ros_pad.trials.sweep.table import Found, Point, is_sweep, points, read
 
 __all__ = ['Found', 'Job', 'Point', 'Row', 'Sweep', 'Value', 'is_sweep', 'points', 'read', 'run']

@@ -9,8 +9,8 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from functools import partial
+from typing import TypeAlias
 
 import ros_pad
 from ros_pad.configuration import integer
@@ -22,25 +22,11 @@ from ros_pad.trials.sweep.table import Results, columns_of, identity, write_tabl
 from ros_pad.workers import cores, pool
 
 PATIENCE = 20.0  # s, longest wait for a Dask scheduler or its first worker
-CLUSTER_JOBS = 1000  # trials submitted to a Dask cluster at the same time
 
-Finished: TypeAlias = 'Generator[tuple[Job, Row], None, None]'
+Workers: TypeAlias = 'tuple[Callable[[], AbstractContextManager[Executor]], int]'
+"""What opens an executor, and how many trials are submitted to it at the same time."""
 
-
-@dataclass(frozen=True)
-class Workers:
-    """Processes or cluster on which trials run.
-
-    Attributes
-    ----------
-    executor : callable
-        Opens an executor of ``concurrent.futures``.
-    jobs : int
-        Number of trials that are submitted to it at the same time.
-    """
-
-    executor: Callable[[], AbstractContextManager[Executor]]
-    jobs: int
+Pairs: TypeAlias = 'Generator[tuple[Job, Row], None, list[Job]]'
 
 
 def run(
@@ -89,22 +75,22 @@ def run(
         integer('workers', workers, 1)
     jobs = {job.key: job for job in sweep.jobs()}
     with ExitStack() as stack:
-        if scheduler is None:
-            used = _processes(workers or cores())
-        else:
+        count = workers or cores()
+        # Twice as many jobs as processes, so that no process waits for work.
+        used: Workers = partial(pool, count), 2 * count
+        if scheduler is not None:
             used = stack.enter_context(_cluster(scheduler))
         results = stack.enter_context(Results(folder, identity(sweep), jobs))
         if retry:
             results.forget_failures()
         missing = [job for key, job in jobs.items() if key not in results]
+        progress = progress or (lambda done: None)
         try:
-            if progress:
-                progress(len(results))
-            with closing(finished(missing, used)) as rows:
+            progress(len(results))
+            with closing(_finished(missing, used)) as rows:
                 for job, row in rows:
                     results.add(job.key, row)
-                    if progress:
-                        progress(len(results))
+                    progress(len(results))
         finally:
             table = results.rows(jobs)
             write_tables(table, results.folder)
@@ -115,19 +101,15 @@ def run_job(job: Job) -> Row:
     """Run one trial and return its row; if the trial fails, the row has its error."""
     try:
         trial = loop.run(
-            job.scene,
-            job.policy,
-            job.seed,
-            job.level,
-            tuning=job.tuning,
+            job.scene, job.policy, job.seed, job.level, tuning=job.tuning,
             policy_parameters=job.policy_parameters,
-        )
+        )  # fmt: skip
     except Exception as error:  # the other trials continue after any error
         return job.failed(f'{type(error).__name__}: {error}')
     return job.labels | columns_of(trial)
 
 
-def finished(jobs: Iterable[Job], workers: Workers) -> Finished:
+def _finished(jobs: Iterable[Job], workers: Workers) -> Generator[tuple[Job, Row], None, None]:
     """Yield jobs with their rows as they finish.
 
     A process that dies (for lack of memory, for example) breaks its whole pool. The trials of this
@@ -135,51 +117,36 @@ def finished(jobs: Iterable[Job], workers: Workers) -> Finished:
     """
     left = deque(jobs)
     while left:
-        suspects = yield from _until_broken(left, workers)
-        for job in suspects:
+        for job in (yield from _until_broken(left, workers)):
             if (yield from _until_broken(deque([job]), workers)):
                 yield job, job.failed('its process died, possibly for lack of memory')
 
 
-def _until_broken(
-    left: deque[Job], workers: Workers
-) -> Generator[tuple[Job, Row], None, list[Job]]:
+def _until_broken(left: deque[Job], workers: Workers) -> Pairs:
     """Run the remaining jobs; if the executor breaks, return the jobs that it had accepted."""
     running: dict[Future[Row], Job] = {}
-    with workers.executor() as executor:
+    opened, most = workers
+    with opened() as executor:
         try:
             while left or running:
-                while left and len(running) < workers.jobs:
+                while left and len(running) < most:
                     running[executor.submit(run_job, left[0])] = left[0]
                     left.popleft()
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    row = _row(running[future], future)
+                    try:
+                        row = future.result()
+                    except BrokenProcessPool:
+                        raise
+                    except CancelledError as error:
+                        raise PadError(
+                            f'the connection to the Dask scheduler was lost: {error}'
+                        ) from error
+                    except Exception as error:  # a job that killed workers of a cluster, say
+                        row = running[future].failed(f'{type(error).__name__}: {error}')
                     yield running.pop(future), row
         except BrokenProcessPool:
             return list(running.values())
     return []
-
-
-def _row(job: Job, future: Future[Row]) -> Row:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        raise
-    except CancelledError as error:
-        raise PadError(f'the connection to the Dask scheduler was lost: {error}') from error
-    except Exception as error:  # for example a job that killed several workers of a cluster
-        return job.failed(f'{type(error).__name__}: {error}')
-
-
-# --- on the cores of this machine ---------------------------------------------------------------
-
-
-def _processes(count: int) -> Workers:
-    # Twice as many jobs as processes, so that no process waits for work.
-    return Workers(lambda: pool(count), 2 * count)
-
-
-# --- on a Dask cluster --------------------------------------------------------------------------
 
 
 @contextmanager
@@ -197,30 +164,27 @@ def _cluster(address: str) -> Iterator[Workers]:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
             versions = client.run(_version)
-        except TimeoutError as error:
+        except (ImportError, TimeoutError) as error:
             raise PadError(
-                f'scheduler {address}: no worker after {PATIENCE:g} s: start dask worker {address}'
-            ) from error
-        except ImportError as error:
-            raise PadError(
-                f'workers of {address} need ros_pad {_version()}, install it there: {error}'
+                f'scheduler {address}: no worker with ros_pad {_version()} after {PATIENCE:g} s:'
+                f' {error}: start dask worker {address}'
             ) from error
         for worker, theirs in versions.items():
             if theirs != _version():
                 raise PadError(
                     f'worker {worker} has ros_pad {theirs}: {_version()} is needed, as here'
                 )
-        yield Workers(lambda: _on_client(client), CLUSTER_JOBS)
 
+        @contextmanager
+        def opened() -> Iterator[Executor]:
+            """Open an executor; Dask itself repeats the jobs of a lost worker."""
+            executor = client.get_executor(pure=False)
+            try:
+                yield executor
+            finally:
+                executor.shutdown(wait=False)
 
-@contextmanager
-def _on_client(client: Any) -> Iterator[Executor]:
-    """Open an executor of a cluster; Dask itself repeats the jobs of a lost worker."""
-    executor = client.get_executor(pure=False)
-    try:
-        yield executor
-    finally:
-        executor.shutdown(wait=False)
+        yield opened, 1000
 
 
 def _version() -> str:

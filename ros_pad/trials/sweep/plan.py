@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 import os
@@ -27,7 +26,6 @@ from ros_pad.yaml_text import read_yaml
 
 _ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
 _POLICY = [each.name for each in POLICY_SETTINGS]
-LARGEST_SEED = 2**31 - 1
 
 Value: TypeAlias = 'float | int | bool | str'
 """Value of a parameter of a sweep."""
@@ -141,9 +139,12 @@ class Sweep:
         for policy in self.policies:
             choice('policy', policy, POLICIES)
         for seed in self.seeds:
-            integer('seed', seed, 0, LARGEST_SEED)
+            integer('seed', seed, 0, 2**31 - 1)
         for name in self.parameters:
-            _check_name(name)
+            # Reading the scene refuses other unknown names.
+            known, head = [*_ESTIMATOR, *_POLICY], name.rpartition('.')[0]
+            if name == 'policy' or (head in ('policy', 'estimator') and name not in known):
+                choice('parameter', name, known)
 
     def jobs(self) -> list[Job]:
         """Return the trials, in order, each checked as far as is possible without running it.
@@ -159,15 +160,19 @@ class Sweep:
             When a value is not allowed; the message names it, its parameter and what is allowed.
         """
         found: dict[str, Job] = {}
-        for source, values in itertools.product(self.scenes, self._combinations()):
+        for source, given in itertools.product(
+            self.scenes, itertools.product(*self.parameters.values())
+        ):
+            values = dict(zip(self.parameters, given, strict=True))
             of_policy = {name: value for name, value in values.items() if name in _POLICY}
             of_estimator = {name: value for name, value in values.items() if name in _ESTIMATOR}
-            scene = scene_with(
-                source, {n: v for n, v in values.items() if n not in {*of_policy, *of_estimator}}
-            )
-            tuning = _tuning(scene, of_estimator)
+            of_scene = {n: v for n, v in values.items() if n not in of_policy | of_estimator}
+            scene = scene_with(source, of_scene)
+            with _errors_naming(of_estimator):
+                changes: dict[str, Any] = {_ESTIMATOR[n]: v for n, v in of_estimator.items()}
+                tuning = replace(tuning_for(scene), **changes)
             for policy in self.policies or (scene.policy,):
-                labels: dict[str, Value | None] = dict(values)
+                labels: dict[str, Any] = dict(values)
                 parameters: dict[str, Any] = {}
                 if policy == 'adaptive':
                     parameters = {n.removeprefix(PREFIX): v for n, v in of_policy.items()}
@@ -180,44 +185,14 @@ class Sweep:
                     identity = {'scene': source, 'policy': policy, 'seed': seed} | labels
                     job = Job(identity, scene, policy, seed, level, tuning, parameters)
                     found.setdefault(job.key, job)
-        self._refuse_unused({job.policy for job in found.values()})
-        return list(found.values())
-
-    def _combinations(self) -> Iterator[dict[str, Value]]:
-        for values in itertools.product(*self.parameters.values()):
-            yield dict(zip(self.parameters, values, strict=True))
-
-    def _refuse_unused(self, policies: set[str]) -> None:
-        """Refuse parameters of the adaptive policy in a sweep without the adaptive policy."""
+        policies = {job.policy for job in found.values()}
         for name in self.parameters:
             if name in _POLICY and 'adaptive' not in policies:
                 raise InvalidInput(
                     f'parameter {name!r}: only adaptive has parameters, but the policies of this'
                     f' sweep are {", ".join(sorted(policies))}'
                 )
-
-
-def _check_name(name: str) -> None:
-    """Refuse a misspelt parameter of a node; reading the scene refuses other unknown names."""
-    if name == 'policy':
-        raise InvalidInput("parameter 'policy' is not allowed: give policies with --policy")
-    head, _, leaf = name.rpartition('.')
-    near: list[str] = []
-    if name.startswith(PREFIX):
-        near = difflib.get_close_matches(name, _POLICY, n=1) or ['policy.dwell']
-    elif head in ('', 'estimator'):
-        near = difflib.get_close_matches(leaf, _ESTIMATOR, n=1, cutoff=0.85)
-    if near and name not in (*_ESTIMATOR, *_POLICY):
-        raise InvalidInput(
-            f'parameter {name!r} is unknown. Did you mean {near[0]!r}? Parameters of nodes are'
-            f' {", ".join([*_ESTIMATOR, *_POLICY])}'
-        )
-
-
-def _tuning(scene: Scene, values: Mapping[str, Value]) -> Tuning:
-    changes: dict[str, Any] = {_ESTIMATOR[name]: value for name, value in values.items()}
-    with _errors_naming(values):
-        return replace(tuning_for(scene), **changes)
+        return list(found.values())
 
 
 @contextmanager

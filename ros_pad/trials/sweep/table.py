@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of a sweep: stored after each trial, and written as a table at the end."""
+"""The rows of a sweep: stored after each trial, read again, and their means over seeds."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ import csv
 import hashlib
 import importlib.util
 import json
+import math
 import os
 import pathlib
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from scipy.special import stdtrit
+
 import ros_pad
+from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput, PadError
 from ros_pad.trials.sweep.plan import Row, Sweep, scene_with
 from ros_pad.trials.trial import Trial, fault_lines
@@ -27,20 +33,13 @@ SCENE = 'scene '  # prefix of the fingerprint of a scene in an identity
 def columns_of(trial: Trial) -> Row:
     """Return the metrics of a trial by column, with one column for each leg of a list."""
     assert trial.metrics is not None
-    found: Row = {}
-    for name, value in trial.metrics.as_dict().items():
-        if name == 'refusals':
-            found[name] = '; '.join(value)
-        elif name == 'faults':
-            found[name] = '; '.join(fault_lines(value))
-        elif name == 'cycles':  # renamed, because a scene has a key of this name
-            found['cycles_walked'] = value
-        elif isinstance(value, list):
-            found |= {
-                f'{name}_leg{leg}': each for leg, each in zip(trial.legs, value, strict=True)
-            }
-        else:
-            found[name] = value
+    found = trial.metrics.as_dict()
+    found['cycles_walked'] = found.pop('cycles')  # a scene has a key of this name
+    found['faults'] = '; '.join(fault_lines(found['faults']))
+    found['refusals'] = '; '.join(found['refusals'])
+    for name in [name for name, value in found.items() if isinstance(value, list)]:
+        for leg, value in zip(trial.legs, found.pop(name), strict=True):
+            found[f'{name}_leg{leg}'] = value
     return found | {'level': trial.fidelity, 'real_time_factor': trial.real_time_factor}
 
 
@@ -49,17 +48,27 @@ def identity(sweep: Sweep) -> dict[str, Any]:
 
     Trials belong to one sweep only if these are the same; scenes may be added.
     """
-    scenes = {
-        # The representation of a scene holds all of its values, also those of its foot.
-        f'{SCENE}{each}': hashlib.sha256(repr(scene_with(each, {})).encode()).hexdigest()
-        for each in sweep.scenes
-    }
     return {
         'version': ros_pad.__version__,
         'fidelity': sweep.fidelity,
         'parameters': sorted(sweep.parameters),
-        **scenes,
+        # The representation of a scene holds all of its values, also those of its foot.
+        **{
+            f'{SCENE}{each}': hashlib.sha256(repr(scene_with(each, {})).encode()).hexdigest()
+            for each in sweep.scenes
+        },
     }
+
+
+@contextmanager
+def _named(path: pathlib.Path) -> Iterator[None]:
+    """Turn an error of a database into one that names its file."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        if 'locked' in str(error):
+            raise PadError(f'{path.parent}: a sweep is running here: wait for its end') from error
+        raise PadError(f'{path} cannot be read or written: {error}') from error
 
 
 class Results:
@@ -94,70 +103,41 @@ class Results:
             )
         self.folder.mkdir(parents=True, exist_ok=True)
         # SQLite's transactions survive a kill in the middle of writing.
-        self._base = sqlite3.connect(path, timeout=0.0, isolation_level=None)
-        try:
-            with self._named():
-                self._open(about, set(keys))
-        except BaseException:
-            self._base.close()
-            raise
+        with _named(path), ExitStack() as stack:
+            base = sqlite3.connect(path, timeout=0.0, isolation_level=None)
+            self._base = stack.enter_context(closing(base))
+            base.execute('PRAGMA locking_mode = EXCLUSIVE')
+            base.execute('BEGIN EXCLUSIVE')
+            base.execute('CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT)')
+            base.execute('CREATE TABLE IF NOT EXISTS trial (key TEXT PRIMARY KEY, row TEXT)')
+            rows = base.execute('SELECT key, row FROM trial')
+            self._rows = {key: json.loads(row) for key, row in rows}
+            self._refuse(about, set(keys))
+            pairs = [(name, json.dumps(value)) for name, value in about.items()]
+            base.executemany('INSERT OR REPLACE INTO about VALUES (?, ?)', pairs)
+            base.execute('COMMIT')
+            self.close = stack.pop_all().close
 
-    @contextmanager
-    def _named(self) -> Iterator[None]:
-        """Turn an error of the database into one that names its file."""
-        try:
-            yield
-        except sqlite3.Error as error:
-            if 'locked' in str(error):
-                raise PadError(
-                    f'{self.folder}: another sweep is running in this folder: wait for its end'
-                ) from error
-            # A full disk, or a folder without the right to write, damages nothing.
-            full = isinstance(error, sqlite3.OperationalError)
-            what = 'cannot be written' if full else 'is damaged'
-            raise PadError(f'{self.folder / RESULTS} {what}: {error}') from error
-
-    def _open(self, about: Mapping[str, Any], keys: set[str]) -> None:
-        base = self._base
-        base.execute('PRAGMA locking_mode = EXCLUSIVE')
-        base.execute('BEGIN EXCLUSIVE')
-        base.execute('CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT)')
-        base.execute('CREATE TABLE IF NOT EXISTS trial (key TEXT PRIMARY KEY, row TEXT)')
-        self._compare(about)
-        rows = base.execute('SELECT key, row FROM trial')
-        self._rows = {key: json.loads(row) for key, row in rows}
-        self._refuse_others(keys)
-        for name, value in about.items():
-            base.execute('INSERT OR REPLACE INTO about VALUES (?, ?)', (name, json.dumps(value)))
-        base.execute('COMMIT')
-
-    def _compare(self, about: Mapping[str, Any]) -> None:
+    def _refuse(self, about: Mapping[str, Any], keys: set[str]) -> None:
+        """Refuse another sweep, and one that lacks trials which are there."""
         for name, text in self._base.execute('SELECT name, value FROM about').fetchall():
             before, now = json.loads(text), about.get(name)
-            if before == now or (name.startswith(SCENE) and now is None):
-                continue
-            if name.startswith(SCENE):
+            if before != now and not (name.startswith(SCENE) and now is None):
                 raise InvalidInput(
-                    f'{self.folder}: {name} has changed since these trials: take a new folder'
+                    f'{self.folder} holds a sweep with {name} {before}, not {now}: take a new'
+                    ' folder'
                 )
-            raise InvalidInput(
-                f'{self.folder} holds a sweep with {name} {before}, not {now}: take a new folder'
-            )
-
-    def _refuse_others(self, keys: set[str]) -> None:
-        others = sorted(set(self._rows) - keys)
-        if others:
-            first = ', '.join(f'{name}={value}' for name, value in json.loads(others[0]).items())
+        if others := sorted(set(self._rows) - keys):
             raise InvalidInput(
                 f'{self.folder} holds {len(others)} trials that are not in this sweep, such as'
-                f' {first}: add their values to this sweep, or take a new folder'
+                f' {others[0]}: add their values to this sweep, or take a new folder'
             )
 
     def __enter__(self) -> Results:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._base.close()
+        self.close()
 
     def __contains__(self, key: str) -> bool:
         return key in self._rows
@@ -167,7 +147,7 @@ class Results:
 
     def add(self, key: str, row: Row) -> None:
         """Write a row to the disk before returning; keep the row that a key has already."""
-        with self._named():
+        with _named(self.folder / RESULTS):
             self._base.execute('INSERT OR IGNORE INTO trial VALUES (?, ?)', (key, json.dumps(row)))
         self._rows.setdefault(key, row)
 
@@ -179,38 +159,201 @@ class Results:
 
     def rows(self, keys: Iterable[str]) -> list[Row]:
         """Return the finished rows, in the order of ``keys``, all with the same columns."""
-        return aligned([self._rows[key] for key in keys if key in self._rows])
+        return _aligned([self._rows[key] for key in keys if key in self._rows])
 
 
-def aligned(rows: Sequence[Row]) -> list[Row]:
+def _aligned(rows: Sequence[Row]) -> list[Row]:
     """Return rows with the same columns; a value that a row lacks is None."""
     names = dict.fromkeys(name for row in rows for name in row if name not in LAST_COLUMNS)
     return [{name: row.get(name) for name in (*names, *LAST_COLUMNS)} for row in rows]
 
 
-def write_tables(rows: Sequence[Row], folder: pathlib.Path) -> list[pathlib.Path]:
-    """Write ``trials.csv``, and ``trials.parquet`` if pyarrow is installed; return the paths.
+def write_tables(rows: Sequence[Row], folder: pathlib.Path) -> None:
+    """Write ``trials.csv``, and ``trials.parquet`` if pyarrow is installed.
 
     Each file is replaced completely or not at all. Without rows, nothing is written.
     """
     if not rows:
-        return []
-    paths = [folder / 'trials.csv']
-    with _replacing(paths[0]) as part, part.open('w', newline='', encoding='utf-8') as file:
+        return
+    new = folder / '.trials'
+    with new.open('w', newline='', encoding='utf-8') as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
+    new.replace(folder / 'trials.csv')
     if importlib.util.find_spec('pyarrow'):
         import pyarrow.parquet
 
-        paths.append(folder / 'trials.parquet')
-        with _replacing(paths[1]) as part:
-            pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), part)
-    return paths
+        pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), new)
+        new.replace(folder / 'trials.parquet')
 
 
-@contextmanager
-def _replacing(path: pathlib.Path) -> Iterator[pathlib.Path]:
-    part = path.with_name(f'.{path.name}')
-    yield part
-    part.replace(path)
+# --- reading ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Found:
+    """The finished part of the sweep in a folder.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the sweep.
+    sweep : Sweep
+        Scenes, policies, seeds and parameters of the finished trials.
+    rows : list of dict
+        One row for each finished trial, in the order of the sweep, all with the same columns.
+    about : dict
+        Version, fidelity, parameters and checksums of the scenes.
+    """
+
+    folder: pathlib.Path
+    sweep: Sweep
+    rows: list[Row]
+    about: dict[str, Any]
+
+    @property
+    def fingerprints(self) -> dict[str, str]:
+        """Checksum of the content of each scene."""
+        return {
+            name.removeprefix(SCENE): str(value)
+            for name, value in self.about.items()
+            if name.startswith(SCENE)
+        }
+
+
+def is_sweep(folder: str | os.PathLike[str]) -> bool:
+    """Return whether a folder holds a sweep.
+
+    Parameters
+    ----------
+    folder : str or path
+        The folder.
+
+    Returns
+    -------
+    bool
+        True if it has the file of a sweep.
+    """
+    return (pathlib.Path(folder) / RESULTS).is_file()
+
+
+def read(folder: str | os.PathLike[str]) -> Found:
+    """Read the finished trials of a sweep, without changing its folder.
+
+    Parameters
+    ----------
+    folder : str or path
+        Folder of the sweep.
+
+    Returns
+    -------
+    Found
+        Its finished trials.
+
+    Raises
+    ------
+    InvalidInput
+        When the folder holds no sweep, or no trial of it is finished.
+    PadError
+        When the sweep is running, or its file is damaged.
+    """
+    folder = pathlib.Path(folder)
+    if not is_sweep(folder):
+        raise InvalidInput(f'{folder} holds no sweep: there is no {RESULTS} in it')
+    path = (folder / RESULTS).resolve()
+    with (
+        _named(path),
+        closing(sqlite3.connect(f'{path.as_uri()}?mode=ro', timeout=0.0, uri=True)) as base,
+    ):
+        pairs = base.execute('SELECT name, value FROM about ORDER BY rowid').fetchall()
+        rows = [json.loads(row) for (row,) in base.execute('SELECT row FROM trial')]
+    if not rows:
+        raise InvalidInput(f'{folder}: no trial of this sweep is finished')
+    about = {name: json.loads(value) for name, value in pairs}
+    names = [name for name in rows[0] if name in ('scene', 'policy', 'seed', *about['parameters'])]
+    done = {name: {row[name] for row in rows} - {None} for name in names}
+    scenes = [name.removeprefix(SCENE) for name in about if name.startswith(SCENE)]
+    parameters = {name: _sorted(done[name]) for name in names if name in about['parameters']}
+    # A row begins with its labels, in the order of the command line. A sweep runs in the order of
+    # scenes, then parameters, then policies, then seeds.
+    axes: dict[str, list[Any]] = {
+        'scene': [each for each in scenes if each in done['scene']],
+        **parameters,
+        'policy': [each for each in POLICIES if each in done['policy']],
+        'seed': sorted(done['seed']),
+    }
+    rows.sort(key=lambda row: [
+        own.index(row[name]) if row[name] is not None else -1 for name, own in axes.items()
+    ])  # fmt: skip
+    sweep = Sweep(axes['scene'], axes['policy'], axes['seed'], parameters, about['fidelity'])
+    return Found(folder, sweep, _aligned(rows), about)
+
+
+def _sorted(values: Iterable[Any]) -> list[Any]:
+    """Return numbers in their order, or texts in the alphabetical one."""
+    return sorted(values, key=lambda each: (isinstance(each, str), each))
+
+
+@dataclass(frozen=True)
+class Point:
+    """Distance per gait cycle for one scene, policy and combination of parameters, over all seeds.
+
+    Attributes
+    ----------
+    labels : dict
+        Scene, policy and parameters by name.
+    walks : int
+        Number of walks in the mean, which neither failed nor ended early.
+    left_out : int
+        Number of walks that failed or ended early.
+    mean : float or None
+        Mean distance, m; None without walks.
+    low : float or None
+        Lower end of the 95 % interval of the mean by Student's t, m; None for fewer than two
+        walks.
+    high : float or None
+        Upper end of this interval, m.
+    """
+
+    labels: Row
+    walks: int
+    left_out: int
+    mean: float | None
+    low: float | None
+    high: float | None
+
+
+def points(rows: Iterable[Row], parameters: Iterable[str]) -> list[Point]:
+    """Return the mean distance per cycle over the seeds, for each combination of the rest.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        Rows of a sweep, from :func:`run` or :func:`read`.
+    parameters : iterable of str
+        Names of the parameters of the sweep.
+
+    Returns
+    -------
+    list of Point
+        Mean distance, m, and its 95 % interval.
+    """
+    names = ('scene', 'policy', *parameters)
+    groups: dict[tuple[Any, ...], list[float | None]] = {}
+    for row in rows:
+        good = not row.get('error') and not row.get('verdict')
+        group = groups.setdefault(tuple(row[name] for name in names), [])
+        group.append(row['distance_per_cycle_m'] if good else None)
+    found = []
+    for values, group in groups.items():
+        distances = [each for each in group if each is not None]
+        count, mean, low, high = len(distances), None, None, None
+        if count:
+            mean = float(np.mean(distances))
+        if mean is not None and count > 1:
+            half = float(stdtrit(count - 1, 0.975) * np.std(distances, ddof=1)) / math.sqrt(count)
+            low, high = mean - half, mean + half
+        labels = dict(zip(names, values, strict=True))
+        found.append(Point(labels, count, len(group) - count, mean, low, high))
+    return found

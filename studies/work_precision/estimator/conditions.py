@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 from studies.work_precision.estimator.tally import Row, Tally, counted, row_of, row_of_walks
 from studies.work_precision.estimator.walks import (
     FEW_CYCLES,
-    LOADED,
     SEEDS,
     Recording,
     World,
@@ -26,13 +25,6 @@ from studies.work_precision.estimator.walks import (
 )
 
 Disturbance = Callable[[Recording, float, np.random.Generator], Recording]
-
-
-def force_bias(walk: Recording, bias: float, generator: np.random.Generator) -> Recording:
-    """Return the recording with a force offset, N, in a random direction for each leg."""
-    direction = generator.normal(size=(walk.force.shape[1], 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    return replace(walk, force=walk.force + bias * direction)
 
 
 def position_noise(walk: Recording, noise: float, _: np.random.Generator) -> Recording:
@@ -49,26 +41,6 @@ def configured_noise(walk: Recording, noise: float, generator: np.random.Generat
     foot, load, tuning = walk.settings
     settings = (foot, load, replace(tuning, position_noise=noise))
     return replace(position_noise(walk, noise, generator), settings=settings)
-
-
-def configured_factor(walk: Recording, factor: float, _: np.random.Generator) -> Recording:
-    """Return the recording with all configured noise wrong by a factor."""
-    foot, load, tuning = walk.settings
-    tuning = replace(
-        tuning,
-        position_noise=factor * tuning.position_noise,
-        force_noise=factor * tuning.force_noise,
-    )
-    return replace(walk, settings=(foot, load, tuning))
-
-
-def correlated_noise(walk: Recording, time: float, _: np.random.Generator) -> Recording:
-    """Return the recording with position noise of the same size and a correlation time, s."""
-    share = math.exp(-walk.period / time) if time else 0.0
-    noise = walk.noise.copy()
-    for now in range(1, len(noise)):
-        noise[now] = share * noise[now - 1] + math.sqrt(1.0 - share * share) * noise[now]
-    return replace(walk, position=walk.position - walk.noise + noise)
 
 
 def position_steps(walk: Recording, step: float, _: np.random.Generator) -> Recording:
@@ -105,41 +77,10 @@ def configured_as_shipped(walk: Recording, _: float, __: np.random.Generator) ->
     return replace(walk, settings=(Foot.load(walk.foot.source), *walk.settings[1:]))
 
 
-def impacts(walk: Recording, peak: float, generator: np.random.Generator) -> Recording:
-    """Return the recording with a half-sine of 10 ms added to the force at each touch-down.
-
-    Its peak is given in expected loads; up to a third of it acts sideways. Only the measured force
-    changes; the motion of the foot does not.
-    """
-    force = walk.force.copy()
-    length = max(2, round(0.01 / walk.period))
-    shape = np.sin(np.pi * (np.arange(length) + 0.5) / length)
-    for leg in range(force.shape[1]):
-        carries = walk.load[:, leg] > LOADED * walk.expected_load
-        for first in (np.flatnonzero(carries[1:] & ~carries[:-1]) + 1).tolist():
-            angle = generator.uniform(0.0, 2.0 * math.pi)
-            share = generator.uniform(0.0, 1.0 / 3.0)
-            push = np.array([share * math.cos(angle), share * math.sin(angle), 1.0])
-            part = shape[: len(force) - first, None]
-            force[first : first + length, leg] += peak * walk.expected_load * part * push
-    return replace(walk, force=force)
-
-
-def dropped(walk: Recording, share: float, generator: np.random.Generator) -> Recording:
-    """Return the recording without a random share of the messages of each leg."""
-    return replace(walk, arrived=walk.arrived & (generator.random(walk.arrived.shape) >= share))
-
-
 def late_position(walk: Recording, delay: float, _: np.random.Generator) -> Recording:
     """Return the recording with each position measured a given time, s, before its force."""
     sample = np.maximum(0, np.arange(len(walk.stamps)) - round(delay / walk.period))
     return replace(walk, position=walk.position[sample])
-
-
-def clock_jumps(walk: Recording, jump: float, generator: np.random.Generator) -> Recording:
-    """Return the recording with stamps that jump by a given time, s, every 2 s on average."""
-    jumps = generator.random(len(walk.stamps)) < 0.5 * walk.period
-    return replace(walk, stamps=walk.stamps + jump * np.cumsum(jumps))
 
 
 def same(walk: Recording, _: float, __: np.random.Generator) -> Recording:
@@ -162,33 +103,9 @@ def with_stiffness(factor: float) -> World:
     return change
 
 
-def with_patches(length: float) -> World:
-    """Return a function that sets the patch length, m, of a scene that has patches."""
-
-    def change(scene: Scene) -> Scene:
-        if scene.floor.kind != 'patches':
-            return scene
-        return replace(scene, floor=replace(scene.floor, patch_length=length))
-
-    return change
-
-
 def with_wet_friction(friction: float) -> World:
     """Return a function that sets the boundary friction of the feet of a scene."""
     return lambda scene: replace(scene, foot=replace(scene.foot, boundary_friction=friction))
-
-
-def with_mass(factor: float) -> World:
-    """Return a function that multiplies mass and inertia of the body, and the towed weight."""
-
-    def change(scene: Scene) -> Scene:
-        body = scene.body
-        assert isinstance(body, LeggedBody)
-        body = replace(body, mass=factor * body.mass, inertia=factor * body.inertia)
-        tow = replace(scene.tow, weight=factor * scene.tow.weight)
-        return replace(scene, body=body, tow=tow)
-
-    return change
 
 
 @dataclass(frozen=True)
@@ -200,15 +117,13 @@ class Change:
     name, unit : str
     values : tuple of float
     variant : str
-        Whether the estimator is configured for the change, or the fidelity level; may be empty.
+        Whether the estimator is configured for the change; may be empty.
     ordinary : float
         Value without change.
     disturb : callable
         Changes a recording.
     world : callable or None
         Returns, for a value, a function that changes the scenes of new recordings.
-    level : str or None
-        Fidelity level of the recordings; None is the full dynamics, if MuJoCo is installed.
     """
 
     name: str
@@ -218,7 +133,6 @@ class Change:
     variant: str = ''
     disturb: Disturbance = same
     world: Callable[[float], World] | None = None
-    level: str | None = None
 
 
 STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0)
@@ -227,11 +141,8 @@ WET_FRICTIONS = (0.12, 0.25, 0.4, 0.55)
 CONFIGURED, NOT_CONFIGURED = 'configured', 'not configured'
 
 CHANGES = (
-    Change('force bias', 'N', (0.0, 0.5, 1.0, 2.0), 0.0, disturb=force_bias),
     Change('position noise', 'm', NOISES, 1.5e-4, CONFIGURED, configured_noise),
     Change('position noise', 'm', NOISES, 1.5e-4, NOT_CONFIGURED, position_noise),
-    Change('configured noise', 'times', (0.25, 0.5, 1.0, 2.0, 4.0), 1.0, '', configured_factor),
-    Change('correlated noise', 's', (0.0, 5e-3, 2e-2, 5e-2), 0.0, disturb=correlated_noise),
     Change('position steps', 'm', (0.0, 2e-4, 5e-4, 1e-3), 0.0, disturb=position_steps),
     Change('force turned', '°', (0.0, 20.0, 45.0, 90.0, 180.0), 0.0, disturb=turned_forces),
     Change(
@@ -240,18 +151,12 @@ CHANGES = (
     ),
     Change('shear stiffness', 'times', STIFFNESSES[::2], 1.0, CONFIGURED, world=with_stiffness),
     Change('shear stiffness', 'times', STIFFNESSES, 1.0, NOT_CONFIGURED, configured_stiffness),
-    Change('patch length', 'm', (0.2, 0.5, 1.5, 4.0), 1.5, world=with_patches),
     Change('wet friction', '', WET_FRICTIONS, 0.12, CONFIGURED, world=with_wet_friction),
     Change(
         'wet friction', '', WET_FRICTIONS, 0.12, NOT_CONFIGURED,
         disturb=configured_as_shipped, world=with_wet_friction,
     ),
-    Change('impacts', 'loads', (0.0, 2.0, 4.0), 0.0, disturb=impacts),
-    Change('messages dropped', '', (0.0, 0.1, 0.2, 0.3), 0.0, disturb=dropped),
     Change('position late', 's', (0.0, 8e-3, 2e-2, 4e-2), 0.0, disturb=late_position),
-    Change('clock jumps', 's', (-0.5, -0.1, 0.0, 0.1, 0.5), 0.0, disturb=clock_jumps),
-    Change('mass', 'times', (0.5, 1.0, 1.5), 1.0, 'L2', world=with_mass),
-    Change('mass', 'times', (0.5, 1.0, 2.0, 4.0), 1.0, 'L1', world=with_mass, level='L1'),
 )  # fmt: skip
 
 
@@ -359,11 +264,13 @@ def stress(change: Change, count: int | None) -> list[Row]:
     rows = []
     ends = {change.values[0], change.ordinary, change.values[-1]}
     for value in sorted(ends) if count else change.values:
-        plain = change.disturb is not rate and value == change.ordinary and not change.level
+        plain = change.disturb is not rate and value == change.ordinary
         world = None if plain or change.world is None else change.world(value)
-        walks = few_recordings(world, change.level, count)
+        walks = few_recordings(world, count)
         generator = np.random.default_rng(SEEDS)
-        tally = _try([change.disturb(walk, value, generator) for walk in walks])
+        tally = Tally()
+        for walk in walks:
+            tally.add(counted(change.disturb(walk, value, generator)))
         rows.append(
             row_of(
                 tally, part='robustness', name=change.name, variant=change.variant,
@@ -372,13 +279,6 @@ def stress(change: Change, count: int | None) -> list[Row]:
             )
         )  # fmt: skip
     return rows
-
-
-def _try(walks: Sequence[Recording]) -> Tally:
-    tally = Tally()
-    for walk in walks:
-        tally.add(counted(walk))
-    return tally
 
 
 def _shortened(walks: Sequence[Recording]) -> str:

@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,54 +25,44 @@ from studies.work_precision.estimator.tally import (
 )
 from studies.work_precision.estimator.walks import Flags, Recording
 
-RATIO, SPEED, CUSUM, BAYES, SHIPPED = (
-    'T/N',
-    'slip speed',
-    'CUSUM',
-    'Bayes, margin',
-    'FootEstimator, alarm',
-)
+RATIO, SPEED, CUSUM, SHIPPED = 'T/N', 'slip speed', 'CUSUM', 'FootEstimator, alarm'
 RATIOS = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.3, 0.4, 0.6)
 SPEEDS = (0.006, 0.01, 0.014, 0.02, 0.03, 0.04, 0.06, 0.1)  # m/s
 CUSUM_SPEEDS = (0.01, 0.02, 0.04)  # m/s
 CUSUM_THRESHOLDS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-MARGINS = (-0.3, -0.2, -0.15, -0.1, -0.05, -0.02, 0.0, 0.02, 0.05)
+
+Settings: TypeAlias = tuple[Foot, float, Tuning]
+"""Arguments of an estimator."""
+
+Update: TypeAlias = Callable[[float, Sequence[float], Sequence[float], float], bool]
+"""Processes time (s), force (N), position (m) and pressure (Pa) of a foot as
+:meth:`FootEstimator.update` does; returns whether the alarm is on."""
 
 
-class Detector(Protocol):
-    """Slip alarm that processes the samples of a foot, as :meth:`FootEstimator.update` does."""
-
-    def update(
-        self, time: float, force: Sequence[float], position: Sequence[float], pressure: float
-    ) -> bool:
-        """Process one sample (s, N, m, Pa gauge); return whether the alarm is on."""
-
-
-class RatioThreshold:
-    """Alarm if T/N is above a threshold."""
-
-    def __init__(self, settings: tuple[Foot, float, Tuning], threshold: float) -> None:
-        self._gate, self._threshold = settings[2].load_gate * settings[1], threshold
+def ratio_alarm(settings: Settings, threshold: float) -> Update:
+    """Return an alarm that is on if T/N is above a threshold."""
+    gate = settings[2].load_gate * settings[1]
 
     def update(
-        self, time: float, force: Sequence[float], position: Sequence[float], pressure: float
+        time: float, force: Sequence[float], position: Sequence[float], pressure: float
     ) -> bool:
-        """Process one sample; return whether the alarm is on."""
         x, y, load = force
-        return load > self._gate and math.hypot(x, y) > self._threshold * load
+        return load > gate and math.hypot(x, y) > threshold * load
+
+    return update
 
 
-class SpeedThreshold:
-    """Alarm if the slip speed, computed as in the estimator, is above a threshold."""
+class SlipSpeed:
+    """The slip speed, computed as in the estimator."""
 
-    def __init__(self, settings: tuple[Foot, float, Tuning], threshold: float) -> None:
+    def __init__(self, settings: Settings) -> None:
         foot, load, tuning = settings
-        self._gate, self._threshold = tuning.load_gate * load, threshold
+        self._gate = tuning.load_gate * load
         self._stiffness, self._smoothing = foot.shear_stiffness, tuning.smoothing
         self._time: float | None = None
         self._x = self._y = 0.0
 
-    def speed(
+    def update(
         self, time: float, force: Sequence[float], position: Sequence[float]
     ) -> tuple[float, float] | None:
         """Return slip speed, m/s, and time since the last sample, s.
@@ -94,116 +84,77 @@ class SpeedThreshold:
         along = (x - self._x) * push_x + (y - self._y) * push_y
         return -along / (self._smoothing * (math.hypot(push_x, push_y) or math.inf)), dt
 
-    def update(
-        self, time: float, force: Sequence[float], position: Sequence[float], pressure: float
-    ) -> bool:
-        """Process one sample; return whether the alarm is on."""
-        found = self.speed(time, force, position)
-        return found is not None and found[0] > self._threshold
 
-
-class SpeedCusum(SpeedThreshold):
-    """The test of :class:`SlipAlarm`, a CUSUM, on the speed of :class:`SpeedThreshold`."""
-
-    def __init__(
-        self, settings: tuple[Foot, float, Tuning], speed: float, threshold: float
-    ) -> None:
-        super().__init__(settings, math.inf)
-        self._noise, self._alarm = alarm_of(settings, speed, threshold)
+def speed_alarm(settings: Settings, threshold: float) -> Update:
+    """Return an alarm that is on if the slip speed is above a threshold, m/s."""
+    slip = SlipSpeed(settings)
 
     def update(
-        self, time: float, force: Sequence[float], position: Sequence[float], pressure: float
+        time: float, force: Sequence[float], position: Sequence[float], pressure: float
     ) -> bool:
-        """Process one sample; return whether the alarm is on."""
-        found = self.speed(time, force, position)
-        if found is None:
-            self._alarm.reset()
-            return False
-        speed, dt = found
-        return self._alarm.update([(speed, self._noise, dt)])
+        found = slip.update(time, force, position)
+        return found is not None and found[0] > threshold
+
+    return update
 
 
-class BayesMargin:
-    """Alarm if the friction margin of :class:`FootEstimator` is below a threshold."""
-
-    def __init__(self, settings: tuple[Foot, float, Tuning], threshold: float) -> None:
-        self._estimator, self._threshold = FootEstimator(*settings), threshold
-
-    def update(
-        self, time: float, force: Sequence[float], position: Sequence[float], pressure: float
-    ) -> bool:
-        """Process one sample; return whether the alarm is on."""
-        now = self._estimator.update(time, force, position, pressure)
-        return now.standing and now.margin < self._threshold
-
-
-class ShippedAlarm:
-    """The alarm of :class:`FootEstimator`."""
-
-    def __init__(self, settings: tuple[Foot, float, Tuning]) -> None:
-        self._estimator = FootEstimator(*settings)
-
-    def update(
-        self, time: float, force: Sequence[float], position: Sequence[float], pressure: float
-    ) -> bool:
-        """Process one sample; return whether the alarm is on."""
-        return self._estimator.update(time, force, position, pressure).slipping
-
-
-def alarm_of(
-    settings: tuple[Foot, float, Tuning], speed: float, threshold: float
-) -> tuple[float, SlipAlarm]:
-    """Return the noise that the estimator assumes, and the alarm for a slip speed, both in m/s."""
+def cusum_alarm(settings: Settings, speed: float, threshold: float) -> Update:
+    """Return the test of :class:`SlipAlarm`, a CUSUM, on the slip speed."""
     foot, _, tuning = settings
+    slip = SlipSpeed(settings)
+    alarm = SlipAlarm(tuning.smoothing, (speed,), threshold)
     noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
     noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
-    return noise, SlipAlarm(tuning.smoothing, (speed,), threshold)
+
+    def update(
+        time: float, force: Sequence[float], position: Sequence[float], pressure: float
+    ) -> bool:
+        found = slip.update(time, force, position)
+        if found is None:
+            alarm.reset()
+            return False
+        speed, dt = found
+        return alarm.update(speed, noise, dt)
+
+    return update
+
+
+def shipped_alarm(settings: Settings) -> Update:
+    """Return the alarm of :class:`FootEstimator`."""
+    estimator = FootEstimator(*settings)
+    return lambda *sample: estimator.update(*sample).slipping
 
 
 @dataclass(frozen=True)
-class Setting:
-    """A method with a threshold.
-
-    Attributes
-    ----------
-    name, variant : str
-    value : float
-        Threshold.
-    unit : str
-    make : callable
-        Returns a detector for the arguments of an estimator.
-    """
+class Method:
+    """A method with a threshold; ``make`` returns an alarm for the arguments of an estimator."""
 
     name: str
     variant: str
     value: float
     unit: str
-    make: Callable[[tuple[Foot, float, Tuning]], Detector]
+    make: Callable[[Settings], Update]
 
 
-def settings() -> list[Setting]:
+def methods() -> list[Method]:
     """Return every method with its thresholds."""
-
-    def of(kind: Any, *values: float) -> Callable[[tuple[Foot, float, Tuning]], Detector]:
-        return lambda settings: kind(settings, *values)
-
-    found = [Setting(RATIO, '', r, '', of(RatioThreshold, r)) for r in RATIOS]
-    found += [Setting(SPEED, '', v, 'm/s', of(SpeedThreshold, v)) for v in SPEEDS]
-    found += [
-        Setting(CUSUM, f'{1e3 * speed:g} mm/s', threshold, '', of(SpeedCusum, speed, threshold))
-        for speed in CUSUM_SPEEDS
-        for threshold in CUSUM_THRESHOLDS
-    ]
-    found += [Setting(BAYES, '', m, '', of(BayesMargin, m)) for m in MARGINS]
-    return [*found, Setting(SHIPPED, '', 0.0, '', ShippedAlarm)]
+    found = [Method(RATIO, '', r, '', lambda s, r=r: ratio_alarm(s, r)) for r in RATIOS]  # type: ignore[misc]
+    found += [Method(SPEED, '', v, 'm/s', lambda s, v=v: speed_alarm(s, v)) for v in SPEEDS]  # type: ignore[misc]
+    for speed in CUSUM_SPEEDS:
+        found += [
+            Method(CUSUM, f'{1e3 * speed:g} mm/s', t, '',
+                   lambda s, v=speed, t=t: cusum_alarm(s, v, t))  # type: ignore[misc]
+            for t in CUSUM_THRESHOLDS
+        ]  # fmt: skip
+    return [*found, Method(SHIPPED, '', 0.0, '', shipped_alarm)]
 
 
-def detect(walk: Recording, make: Callable[[tuple[Foot, float, Tuning]], Detector]) -> Flags:
-    """Return whether the alarm of a detector is on, array (samples, legs)."""
+def detect(walk: Recording, make: Callable[[Settings], Update]) -> Flags:
+    """Return whether an alarm is on, array (samples, legs)."""
     out = np.zeros(walk.load.shape, dtype=bool)
     stamps = walk.stamps.tolist()
     for leg, mine in enumerate(walk.rows):
-        update = make(walk.settings).update
+        update = make(walk.settings)
         out[:, leg] = [
             update(stamp, row[:3], row[3:6], row[6])
             for stamp, row in zip(stamps, mine, strict=True)
@@ -216,41 +167,37 @@ def compare(walks: Sequence[Recording], progress: Progress) -> list[Row]:
 
     Progress, 0 to 1, is reported to ``progress``.
     """
-    every = settings()
-    # The margin does not depend on the threshold, so it is estimated once.
-    estimates = [replay(walk) for walk in walks]
-    times = {setting.name: cost(walks[0], setting.make) for setting in every}
+    every = methods()
+    times = {method.name: cost(walks[0], method.make) for method in every}
     rows = []
-    for done, setting in enumerate(every):
+    for done, method in enumerate(every):
         tally = Tally()
-        for walk, mine in zip(walks, estimates, strict=True):
-            if setting.name == BAYES:
-                alarms = mine.standing & (mine.margin < setting.value)
-            elif setting.name == SHIPPED:
-                alarms = mine.slipping
-                count_estimates(tally, walk, mine)
+        for walk in walks:
+            if method.name == SHIPPED:
+                estimates = replay(walk)
+                count_alarms(tally, walk, estimates.slipping)
+                count_estimates(tally, walk, estimates)
             else:
-                alarms = detect(walk, setting.make)
-            count_alarms(tally, walk, alarms)
+                count_alarms(tally, walk, detect(walk, method.make))
         rows.append(
             row_of(
-                tally, times[setting.name], part='methods', name=setting.name,
-                variant=setting.variant, value=setting.value, unit=setting.unit,
-                shipped=setting.name == SHIPPED,
+                tally, times[method.name], part='methods', name=method.name,
+                variant=method.variant, value=method.value, unit=method.unit,
+                shipped=method.name == SHIPPED,
             )
         )  # fmt: skip
         progress((done + 1) / len(every))
     return rows
 
 
-def cost(walk: Recording, make: Callable[[tuple[Foot, float, Tuning]], Detector]) -> float:
+def cost(walk: Recording, make: Callable[[Settings], Update]) -> float:
     """Return the mean time of an update over a walk of one leg, us, the best of three runs."""
     stamps = walk.stamps.tolist()
     # Indexing is done before timing, because it is not part of the method.
     samples = [(t, r[:3], r[3:6], r[6]) for t, r in zip(stamps, walk.rows[0], strict=True)]
     best = math.inf
     for _ in range(3):
-        update = make(walk.settings).update
+        update = make(walk.settings)
         start = time.perf_counter()
         for sample in samples:
             update(*sample)

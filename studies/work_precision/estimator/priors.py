@@ -23,10 +23,7 @@ them; these begin with seeds 70 and 300, which no setting has seen.
 
 from __future__ import annotations
 
-import hashlib
 import math
-import pathlib
-import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -42,7 +39,6 @@ from ros_pad.estimation.friction import GroundFilter, GroundModel
 from ros_pad.estimation.ground import shared_friction
 from ros_pad.estimation.scales import SCALE_SD, SPREADS
 from ros_pad.estimation.tuning import Tuning
-from ros_pad.reports.files import save
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.soles import Sole
 from ros_pad.simulation.terrain import CELL, LENGTH, WIDTH
@@ -208,26 +204,11 @@ def updates(walk: Recording, learns: bool) -> Iterator[tuple[float, int, int, in
                 yield time, leg, stances[leg], ground, friction, estimators[leg]
 
 
-def kept(
-    condition: Condition, policy: str, seed: int, duration: int, cache: pathlib.Path | None
-) -> Recording:
-    """Return a recording from a folder, after it was walked and written there if need be."""
-    if cache is None:
-        return walked(condition, policy, seed, duration)
-    what = repr((condition, policy, seed, duration))
-    path = cache / f'{hashlib.sha256(what.encode()).hexdigest()[:16]}.pickle'
-    if not path.exists():
-        cache.mkdir(parents=True, exist_ok=True)
-        save(path, pickle.dumps(walked(condition, policy, seed, duration)))
-    walk: Recording = pickle.loads(path.read_bytes())
-    return walk
-
-
 def measure(
-    condition: Condition, policy: str, seed: int, duration: int, cache: pathlib.Path | None = None
+    condition: Condition, policy: str, seed: int, duration: int
 ) -> dict[str, list[Sample]]:
     """Walk for a duration, s, and return the samples of each filter."""
-    walk = kept(condition, policy, seed, duration, cache)
+    walk = walked(condition, policy, seed, duration)
     found: dict[str, list[Sample]] = {name: [] for name in FILTERS}
     blind = _without_measurement(walk, condition)
     for name in (LEARNS, FIXED):
@@ -366,30 +347,9 @@ def _row(
     )  # fmt: skip
 
 
-def table(rows: Sequence[Row], phases: Sequence[str] = ('whole', 'late')) -> str:
-    """Return the filter that learns, beside the scores of the others, as a table in Markdown."""
-    lines = [
-        '| floor | class | 95 % interval holds (by walk) | where wet or dry is right |'
-        ' below 5 % (by walk) | width | '
-        + ' | '.join(f'CRPS, {name}' for name in FILTERS)
-        + ' | wrong labels | stances, walks |',
-        '|---' * (8 + len(FILTERS)) + '|',
-    ]
-    for row in rows:
-        if row.phase not in phases or row.filter != LEARNS:
-            continue
-        place = (row.condition, row.phase, row.ground)
-        same = [each for each in rows if (each.condition, each.phase, each.ground) == place]
-        scores = ' | '.join(f'{each.crps:.3f}' for each in same)
-        right = '' if row.right_coverage is None else f'{row.right_coverage:.3f}'
-        wrong = '' if row.wrong_labels is None else f'{row.wrong_labels:.3f}'
-        lines.append(
-            f'| {row.condition} | {row.ground} | {row.coverage:.3f}'
-            f' ({row.coverages[0]:.2f} to {row.coverages[1]:.2f}) | {right} | {row.below:.3f}'
-            f' ({row.belows[0]:.2f} to {row.belows[1]:.2f}) | {row.width:.2f} | {scores} |'
-            f' {wrong} | {row.stances}, {row.walks} |'
-        )
-    return '\n'.join(lines)
+def table(rows: Sequence[Row]) -> str:
+    """Return all but the first half minute as text."""
+    return command.listed([asdict(row) for row in rows if row.phase != 'early'])
 
 
 _LOOKS = dict(
@@ -453,37 +413,17 @@ def main(words: Sequence[str]) -> int:
     )
     command.add_count(parser, '--draws', 48, 'number of floors drawn from the prior')
     command.add_count(parser, '--duration', DURATION, 'duration of a walk, s; of drawn ones 40 s')
-    parser.add_argument(
-        '--only', default=[''], nargs='+', metavar='TEXT', help='conditions that begin with a text'
-    )
-    parser.add_argument(
-        '--short', action='store_true',
-        help='2 minutes: 9 drawn floors and a walk of 130 s where dry friction is 1/1.4',
-    )  # fmt: skip
-    parser.add_argument(
-        '--cache', type=pathlib.Path, metavar='DIR',
-        help='keep the recordings here (26 MB each), and walk only those that are not there',
-    )  # fmt: skip
     command.add_processes(parser)
     command.add_out(parser)
     options = parser.parse_args(words)
-    if options.short:
-        options.walks, options.draws, options.duration = 1, 9, 130
-        options.only = [DRAWN, 'dry 1/1.4']
-    only = tuple(options.only)
-    chosen = [each for each in CONDITIONS if each.name.startswith(only)]
-    if options.short:
-        chosen = [each for each in chosen if each.policies == ('flat',)]
-    draws = range(FIRST_DRAW, FIRST_DRAW + options.draws * DRAWN.startswith(only))
+    draws = range(FIRST_DRAW, FIRST_DRAW + options.draws)
     cases = [(*drawn(seed), seed, min(DRAWN_DURATION, options.duration)) for seed in draws]
     cases += [
         (each, policy, seed, options.duration)
-        for each in chosen for policy in each.policies
+        for each in CONDITIONS for policy in each.policies
         for seed in range(FIRST_SEED, FIRST_SEED + options.walks * each.walks)
     ]  # fmt: skip
-    parts = command.in_processes(
-        measure, [(*case, options.cache) for case in cases], options.processes, NAME
-    )
+    parts = command.in_processes(measure, cases, options.processes, NAME)
     rows: list[Row] = []
     for name in dict.fromkeys(case[0].name for case in cases):
         mine = [(case, part) for case, part in zip(cases, parts, strict=True)

@@ -34,7 +34,7 @@ from studies import command
 from studies.work_precision.estimator import chart, conditions
 from studies.work_precision.estimator.methods import compare
 from studies.work_precision.estimator.tally import Row
-from studies.work_precision.estimator.walks import full, recordings
+from studies.work_precision.estimator.walks import recordings
 
 
 def measure(count: int | None, processes: int) -> dict[str, Any]:
@@ -81,58 +81,9 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-NEEDS_MUJOCO = 'full dynamics not compared: pip install "ros_pad[mujoco]"'
-_HEADINGS = (
-    'delay', 'slipped', 'misses', 'false/', 'update', 'Brier', 'wet', 'within', 'margin',
-    '2 sigma: dry', 'wet', 'dome',
-)  # fmt: skip
-_UNITS = ('ms', 'mm', '%', 'minute', 'us', '', 'right', '2 sigma', 'below 5 %', '', '', '')
-_WIDTHS = [max(10, len(a) + 2, len(b) + 2) for a, b in zip(_HEADINGS, _UNITS, strict=True)]
-
-
 def table(rows: Sequence[Row]) -> str:
-    """Return the rows as text."""
-    lines = []
-    for part, title in (
-        ('methods', 'methods, each over its thresholds'),
-        ('robustness', 'FootEstimator under changed conditions (* ordinary)'),
-        ('walks', 'FootEstimator by robot and floors, with 95 % intervals over walks'),
-    ):
-        mine = [row for row in rows if row.part == part]
-        if not mine:
-            continue
-        lines.append(
-            f'{title}: {max(row.slips for row in mine)} slips and'
-            f' {max(row.stick_minutes for row in mine):.1f} minutes of stick at most'
-        )
-        for heads in (_HEADINGS, _UNITS):
-            cells = ''.join(f'{head:>{width}}' for head, width in zip(heads, _WIDTHS, strict=True))
-            lines.append(f'  {"":38}{cells}')
-        lines += [_line(row) for row in mine]
-    if full() == 'L1':
-        lines.append(NEEDS_MUJOCO)
-    return '\n'.join(lines)
-
-
-def _line(row: Row) -> str:
-    name = ', '.join(filter(None, (row.name, row.variant)))
-    named = f'{name} {row.value:g} {row.unit}'.strip() + (' *' if row.shipped else '')
-    values = (
-        _shown(row.delay, 1e3), _shown(row.slip_distance, 1e3), _shown(row.misses, 1e2),
-        _shown(row.false_per_minute), _shown(row.us_per_update), _shown(row.brier),
-        _shown(row.wet_right), _shown(row.coverage), _shown(row.below),
-        *(_shown(row.coverages.get(name)) for name in ('dry', 'wet', 'dome')),
-    )  # fmt: skip
-    cells = ''.join(f'{value:>{width}}' for value, width in zip(values, _WIDTHS, strict=True))
-    note = row.note
-    if row.walks:
-        ends = ', '.join(f'{name} {a:.3g} to {b:.3g}' for name, (a, b) in row.intervals.items())
-        note += f': {row.walks} walks, {row.slips} slips; {ends}'
-    return f'  {named:38}{cells}' + (f'  {note}' if note else '')
-
-
-def _shown(value: float | None, scale: float = 1.0) -> str:
-    return '-' if value is None else f'{scale * value:.3g}'
+    """Return the rows as text; s, m, 1/min, us, shares."""
+    return command.listed([asdict(row) for row in rows])
 
 
 def figures(rows: Sequence[Row]) -> dict[str, Figure]:

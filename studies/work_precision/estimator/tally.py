@@ -8,7 +8,7 @@ import math
 import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 
@@ -25,23 +25,14 @@ STILL = 5e-4  # m: motion that is allowed in a stick
 STANCE = 0.1  # s: shorter stances are not counted for wetness
 
 
-class Targets(TypedDict):
-    """Targets of a :class:`Row`: upper bounds; lower for ``wet_right``, two for ``coverage``."""
-
-    misses: float
-    false_per_minute: float
-    wet_right: float
-    coverage: tuple[float, float]
-    us_per_update: float
-
-
-TARGETS: Targets = {
+TARGETS: dict[str, Any] = {
     'misses': 0.01,
     'false_per_minute': 1.0,
     'wet_right': 0.97,
     'coverage': (0.90, 0.99),
     'us_per_update': 20.0,
 }
+"""Targets of a :class:`Row`: upper bounds; lower for ``wet_right``, two for ``coverage``."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +48,6 @@ class Estimates:
         P(wet), friction and its standard deviation, friction margin, slip speed in m/s.
     updates : int
         Number of samples.
-    axes : array of bool
-        Whether turned axes are in doubt.
     """
 
     slipping: Flags
@@ -70,14 +59,13 @@ class Estimates:
     margin: Floats
     speed: Floats
     updates: int
-    axes: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 def replay(walk: Recording) -> Estimates:
     """Return the results for the readings of a robot, whose feet learn together."""
     legs = walk.load.shape[1]
     estimators = FootEstimator.of(FeetEstimator(legs, *walk.settings))
-    out = np.empty((*walk.load.shape, 9))
+    out = np.empty((*walk.load.shape, 8))
     rows = walk.rows
     for sample, (stamp, arrived) in enumerate(
         zip(walk.stamps.tolist(), walk.arrived.tolist(), strict=True)
@@ -93,22 +81,13 @@ def replay(walk: Recording) -> Estimates:
             now = estimator.estimate
             found.append(
                 (now.slipping, now.standing, new and now.fresh, now.wet_probability,
-                 now.friction_mean, now.friction_sd, now.margin, now.slip_speed,
-                 now.doubt.startswith('axes'))
+                 now.friction_mean, now.friction_sd, now.margin, now.slip_speed)
             )  # fmt: skip
         out[sample] = found
-    return Estimates(
-        slipping=out[..., 0] > 0.5,
-        standing=out[..., 1] > 0.5,
-        fresh=out[..., 2] > 0.5,
-        wet=out[..., 3],
-        mean=out[..., 4],
-        sd=out[..., 5],
-        margin=out[..., 6],
-        speed=out[..., 7],
-        updates=int(walk.arrived.sum()),
-        axes=out[..., 8] > 0.5,
-    )
+    slipping, standing, fresh = np.moveaxis(out[..., :3] > 0.5, 2, 0)
+    wet, mean, sd, margin, speed = np.moveaxis(out[..., 3:], 2, 0)
+    updates = int(walk.arrived.sum())
+    return Estimates(slipping, standing, fresh, wet, mean, sd, margin, speed, updates)
 
 
 @dataclass
@@ -133,8 +112,6 @@ class Tally:
     covered, below : dict of list of array
         By ground and morphology (``dry``, ``wet``, ``dome``), whether the true friction was within
         2 sigma, and whether the true margin was below its estimated 5 % quantile.
-    axes : list of array
-        Whether turned axes were in doubt.
     """
 
     slips: int = 0
@@ -148,23 +125,15 @@ class Tally:
     wet_ends: list[tuple[bool, float]] = field(default_factory=list)
     covered: dict[str, list[Flags]] = field(default_factory=dict)
     below: dict[str, list[Flags]] = field(default_factory=dict)
-    axes: list[Flags] = field(default_factory=list)
 
     def add(self, other: Tally) -> None:
         """Add the counts of other walks."""
-        self.slips += other.slips
-        self.missed += other.missed
-        self.displaced += other.displaced
-        self.displaced_missed += other.displaced_missed
-        self.delays += other.delays
-        self.slip_distances += other.slip_distances
-        self.false_alarms += other.false_alarms
-        self.stick_time += other.stick_time
-        self.wet_ends += other.wet_ends
-        self.axes += other.axes
-        for mine, others in ((self.covered, other.covered), (self.below, other.below)):
-            for name, arrays in others.items():
-                mine.setdefault(name, []).extend(arrays)
+        for name, value in vars(other).items():
+            if isinstance(value, dict):
+                for key, arrays in value.items():
+                    getattr(self, name).setdefault(key, []).extend(arrays)
+            else:
+                setattr(self, name, getattr(self, name) + value)
 
 
 def counted(walk: Recording) -> Tally:
@@ -236,7 +205,6 @@ def count_alarms(
 
 def count_estimates(tally: Tally, walk: Recording, estimates: Estimates) -> None:
     """Add to a tally whether the estimates of wetness and friction are right."""
-    tally.axes.append(estimates.axes.ravel())
     if walk.sticks_only:
         return
     settled = round(SETTLED / walk.period)
@@ -317,8 +285,6 @@ class Row:
         The same by ground and morphology.
     note : str
         Remark.
-    axes : float or None
-        Share of the time in which turned axes are in doubt.
     walks : int
         Number of walks; 0 if they are not counted.
     intervals : dict of list of float
@@ -349,7 +315,6 @@ class Row:
     coverages: dict[str, float]
     belows: dict[str, float]
     note: str = ''
-    axes: float | None = None
     walks: int = 0
     intervals: dict[str, list[float]] = field(default_factory=dict)
 
@@ -378,7 +343,6 @@ def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Ro
         below=_mean(_joined(tally.below.values())),
         coverages=_means(tally.covered),
         belows=_means(tally.below),
-        axes=_mean(_joined([tally.axes])),
         **names,
     )
 

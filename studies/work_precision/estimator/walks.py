@@ -193,40 +193,36 @@ def recordings(count: int | None = None) -> list[Recording]:
     thesis = [(f'smooth_{name}', name[4:]) for name in ('dry_flat', 'wet_flat', 'wet_dome')]
     plan = plan[-2 * (count or len(plan)) :]
     plan += [(name, policy, SEEDS[0]) for name, policy in thesis[:count]]
-    return _record_all(plan, None, full(), CYCLES)
+    return _record_all(plan, None, CYCLES)
 
 
-def few_recordings(
-    world: World | None = None, level: str | None = None, count: int | None = None
-) -> list[Recording]:
+def few_recordings(world: World | None = None, count: int | None = None) -> list[Recording]:
     """Return the walks for the tests of the estimator under many conditions, or the first ones.
 
     ``world`` changes their scenes.
     """
-    if world is None and level is None:
-        return _ordinary_walks(count)
-    return _few(world, level or full(), count)
+    return _ordinary_walks(count) if world is None else _few(world, count)
 
 
 @functools.cache
 def _ordinary_walks(count: int | None) -> list[Recording]:
-    return _few(None, full(), count)
+    return _few(None, count)
 
 
-def _few(world: World | None, level: str, count: int | None) -> list[Recording]:
+def _few(world: World | None, count: int | None) -> list[Recording]:
     plan = [('patches', 'flat', SEEDS[0]), ('patches', 'dome', SEEDS[1])]
     plan += [('patches', 'adaptive', seed) for seed in SEEDS]
-    return _record_all(plan[:count], world, level, FEW_CYCLES)
+    return _record_all(plan[:count], world, FEW_CYCLES)
 
 
 def _record_all(
-    plan: Sequence[tuple[str, str, int]], world: World | None, level: str, cycles: int
+    plan: Sequence[tuple[str, str, int]], world: World | None, cycles: int
 ) -> list[Recording]:
     change = world or (lambda scene: scene)
 
     def scene_of(name: str) -> Scene:
         return change(replace(Scene.load(f'hexapod_{name}'), cycles=cycles))
 
-    walks = [record(scene_of(name), policy, seed, level) for name, policy, seed in plan]
+    walks = [record(scene_of(name), policy, seed, full()) for name, policy, seed in plan]
     dry = scene_of('smooth_dry_flat')
     return [*walks, record(dry, 'flat', SEEDS[0], 'L1'), pull(dry, 2.0 * cycles, SEEDS[0])]

@@ -2,13 +2,9 @@
 """The robot of L2 in Drake, an engine that shares no code with MuJoCo or with ros_pad's solvers.
 
 Links, masses, servos, gait, floor, films and the law of resistance are the same; rigid-body
-dynamics and contact are Drake's. Drake's friction is that of a point and has no yaw moment, so
-there are two ways to bring in the feet:
-
-- ``sap``, ``lagged``, ``tamsi``: Drake finds the forces; before each step the
-  coefficient of a foot is set from its load in the last one. Soles do not resist turning.
-- ``bristles``: force elements. The ground is a stiff damped spring; along it a foot shears
-  elastically up to its cap, which sliding and turning share, as on L1 and L2.
+dynamics are Drake's. Drake's own friction is that of a point and has no yaw moment, so feet are
+force elements: the ground is a stiff damped spring; along it a foot shears elastically up to its
+cap, which sliding and turning share, as on L1 and L2.
 """
 
 from __future__ import annotations
@@ -16,7 +12,6 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,32 +32,8 @@ from ros_pad.simulation.terrain import Floor
 
 _SHALLOW = 5e-3  # m above the ground: below it the height of the ground under a foot stays
 _THIN = 0.02  # inertia of a rod about its own axis, over that across it, as on L2
-_GROUND = 1e3  # Drake combines two coefficients by their harmonic mean; that of the ground
-
-
-@dataclass(frozen=True)
-class Contact:
-    """How feet touch the ground.
-
-    Attributes
-    ----------
-    kind : str
-        ``bristles``, ``sap``, ``lagged`` or ``tamsi``, see above.
-    stiffness : float
-        Of the ground, and of bristles in shear, N/m.
-    damping : float
-        Of the ground, and of bristles, N s/m.
-    relaxation : float
-        Relaxation time of Drake's contact, s.
-    turning : float
-        Factor on the lever arm of a sole that turns; 0: it does not resist.
-    """
-
-    kind: str = 'bristles'
-    stiffness: float = 1e5
-    damping: float = 200.0
-    relaxation: float = 1e-4
-    turning: float = 1.0
+STIFFNESS, DAMPING = 1e5, 200.0
+"""Of the ground, and of feet in shear, N/m and N s/m."""
 
 
 def _drake(module: str) -> Any:
@@ -84,7 +55,8 @@ class DrakeRobot:
         Time between set-points, s.
     step : float
         Step of Drake, s; a period is a whole number of steps.
-    contact : Contact
+    turning : float
+        Factor on the lever arm of a sole that turns; 0: it does not resist.
 
     Raises
     ------
@@ -93,20 +65,20 @@ class DrakeRobot:
     """
 
     def __init__(
-        self, scene: Scene, floor: Floor, period: float, step: float, contact: Contact
+        self, scene: Scene, floor: Floor, period: float, step: float, turning: float = 1.0
     ) -> None:
         body: Any = scene.body
         self._body = body
         self.legs, self.period, self.time = scene.legs, period, 0.0
         self.verdict: str | None = None
         self.feet = [FootState() for _ in self.legs]
-        self._scene, self._floor, self._contact = scene, floor, contact
+        self._scene, self._floor = scene, floor
         self._robot, self._servo = body.robot, body.robot.servo
         self._substeps = round(period / step)
         self._dt = period / self._substeps
         self._steps = 0
         self._foot = scene.foot.on_rough(scene.floor.roughness)
-        self._lever = contact.turning * self._foot.turning_radius
+        self._lever = turning * self._foot.turning_radius
         self._films = [Film(self._foot, scene.floor.viscosity) for _ in self.legs]
         self._solver = FeetSolver(body.robot)
         gait: Any = scene.gait
@@ -117,7 +89,7 @@ class DrakeRobot:
 
     def _tools(self) -> None:
         self._math, self._tree = _drake('math'), _drake('multibody.tree')
-        self._geometry, self._plants = _drake('geometry'), _drake('multibody.plant')
+        self._plants = _drake('multibody.plant')
         self._framework = _drake('systems.framework')
 
     # --- model --------------------------------------------------------------------------------
@@ -125,7 +97,7 @@ class DrakeRobot:
     def _build(self) -> None:
         scene, tree = self._scene, self._tree
         builder = self._framework.DiagramBuilder()
-        self._plant, self._world = self._plants.AddMultibodyPlantSceneGraph(builder, self._dt)
+        self._plant, _ = self._plants.AddMultibodyPlantSceneGraph(builder, self._dt)
         plant, slope = self._plant, scene.floor.slope
         plant.mutable_gravity_field().set_gravity_vector(
             [-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)]
@@ -137,8 +109,6 @@ class DrakeRobot:
         self._tips = [self._add_leg(leg) for leg in range(len(self.legs))]
         if scene.tow.weight:
             self._add_sled()
-        if self._contact.kind != 'bristles':
-            self._add_contacts()
         plant.Finalize()
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
@@ -189,62 +159,6 @@ class DrakeRobot:
             parent = link
         self._sled = parent
 
-    def _add_contacts(self) -> None:
-        """Give feet, load and ground shapes that Drake's own contact sees."""
-        plants, contact, plant = self._plants, self._contact, self._plant
-        name = f'k{contact.kind.capitalize()}'
-        plant.set_discrete_contact_approximation(
-            plants.DiscreteContactApproximation.__members__[name]
-        )
-        frames = [*self._tips, *([self._sled.body_frame()] if self._scene.tow.weight else [])]
-        self._shapes = [
-            plant.RegisterCollisionGeometry(
-                frame.body(), frame.GetFixedPoseInBodyFrame(), self._geometry.Sphere(1e-4),
-                f'contact_{number}', self._material(0.5),
-            )
-            for number, frame in enumerate(frames)
-        ]  # fmt: skip
-        # Each contact has a ground of its own, whose height follows the floor.
-        self._grounds = [
-            plant.RegisterCollisionGeometry(
-                plant.world_body(), self._math.RigidTransform(), self._geometry.HalfSpace(),
-                f'ground_{number}', self._material(_GROUND, 1e12),
-            )
-            for number in range(len(frames) if self._floor.heights is not None else 1)
-        ]  # fmt: skip
-        several = len(self._grounds) > 1
-        sets, manager = self._geometry.GeometrySet, self._world.collision_filter_manager()
-        for number, shape in enumerate(self._shapes):
-            others = set(self._grounds) - {self._grounds[number * several]}
-            others |= set(self._shapes) - {shape}
-            manager.Apply(
-                self._geometry.CollisionFilterDeclaration().ExcludeBetween(
-                    sets(shape), sets(list(others))
-                )
-            )
-
-    def _level(self) -> None:
-        """Move the grounds of Drake's contact to their heights."""
-        world = self._world
-        for ground, height in zip(self._grounds, self._ground, strict=False):
-            world.ChangeShape(
-                world.GetMyMutableContextFromRoot(self._root), self._plant.get_source_id(),
-                ground, self._geometry.HalfSpace(),
-                self._math.RigidTransform([0.0, 0.0, height]),
-            )  # fmt: skip
-
-    def _material(self, friction: float, stiffness: float | None = None) -> Any:
-        properties = self._geometry.ProximityProperties()
-        own = friction if friction == _GROUND else friction * _GROUND / (2.0 * _GROUND - friction)
-        self._geometry.AddContactMaterial(
-            dissipation=0.0,
-            point_stiffness=stiffness or self._contact.stiffness,
-            friction=self._plants.CoulombFriction(own, own),
-            properties=properties,
-        )
-        properties.AddProperty('material', 'relaxation_time', self._contact.relaxation)
-        return properties
-
     def _weigh_trunk(self) -> None:
         """Give the trunk what the scene's robot has more than the legs: mass, place, inertia."""
         plant, context, tree, body = self._plant, self._context, self._tree, self._body
@@ -277,8 +191,6 @@ class DrakeRobot:
         feet = self._path.feet
         self._targets = np.array(self._solver.angles([(x, y, low) for x, y, _ in feet]))
         self._ground = np.array([self._floor.height(x, y) for x, y, _ in feet])
-        if self._contact.kind != 'bristles':
-            self._level()
         plant.SetFreeBodyPose(
             context, self._trunk, self._math.RigidTransform([0.0, 0.0, self._ground.max() - low])
         )
@@ -298,7 +210,6 @@ class DrakeRobot:
         self._forces = plant.get_applied_generalized_force_input_port().FixValue(
             context, np.zeros(plant.num_velocities())
         )
-        self._contacts = plant.get_contact_results_output_port()
         self._simulator = _drake('systems.analysis').Simulator(self._diagram, self._root)
         self._simulator.Initialize()
         self._last = self._tip_places() - self._shear[: len(feet), :2]
@@ -356,14 +267,11 @@ class DrakeRobot:
         return self._foot.resistance_of(on_domes, load - on_domes, pressure, *films) / load
 
     def _push(self) -> None:
-        """Set the forces of line and bristles, and Drake's coefficients, for the next step."""
+        """Set the forces of line and bristles for the next step."""
         force = np.zeros(self._plant.num_velocities())
         if self._scene.tow.weight:
             self._pull(force)
-        if self._contact.kind == 'bristles':
-            self._press(force)
-        else:
-            self._rub()
+        self._press(force)
         self._forces.GetMutableData().get_mutable_value().SetFromVector(force)
 
     def _jacobian(self, frame: Any, at: Vector = (0.0, 0.0, 0.0)) -> Array:
@@ -392,20 +300,20 @@ class DrakeRobot:
 
     def _press(self, force: Array) -> None:
         """Add the forces of the ground: springs that press, and bristles up to the cap."""
-        contact, plant, context, count = self._contact, self._plant, self._context, len(self._tips)
+        plant, context, count = self._plant, self._context, len(self._tips)
         frames = [*self._tips, *([self._sled.body_frame()] if len(self._loads) > count else [])]
         jacobians = np.array([self._jacobian(frame)[2:] for frame in frames])  # yaw, x, y, z
         speeds = jacobians @ plant.GetVelocities(context)
         places = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
         deep = -places[:, 2]
         deep[:count] += self._ground
-        loads = contact.stiffness * deep - contact.damping * speeds[:, 3]
+        loads = STIFFNESS * deep - DAMPING * speeds[:, 3]
         loads = np.where(deep > 0.0, np.maximum(loads, 0.0), 0.0)
         levers = np.full(len(frames), self._lever)
         levers[count:] = 0.0
         slides = np.column_stack([speeds[:, 1:3], levers * speeds[:, 0]])
         self._shear += self._dt * slides
-        push = -contact.stiffness * self._shear - contact.damping * slides
+        push = -STIFFNESS * self._shear - DAMPING * slides
         for index in np.flatnonzero(loads).tolist():
             self._ratios[index] = (
                 self._coefficient(index, loads[index], self._dt)
@@ -416,54 +324,28 @@ class DrakeRobot:
         size = np.linalg.norm(push, axis=1)
         slips = size > caps
         push[slips] *= (caps[slips] / np.maximum(size[slips], 1e-30))[:, None]
-        self._shear[slips] = -push[slips] / contact.stiffness
+        self._shear[slips] = -push[slips] / STIFFNESS
         wrench = np.column_stack([levers * push[:, 2], push[:, :2], loads])
         force += np.einsum('ijk,ij->k', jacobians, wrench)
         self._loads = loads
-
-    def _rub(self) -> None:
-        """Set Drake's coefficients from the loads of the last step."""
-        results = self._contacts.Eval(self._context)
-        loads = dict.fromkeys(self._shapes, 0.0)
-        for number in range(results.num_point_pair_contacts()):
-            info = results.point_pair_contact_info(number)
-            pair = info.point_pair()
-            loads[pair.id_A if pair.id_A in loads else pair.id_B] = abs(info.contact_force()[2])
-        self._loads = np.array(list(loads.values()))
-        for index, (shape, load) in enumerate(loads.items()):
-            if index < len(self._tips):
-                ratio = self._coefficient(index, load, self._dt if load > LIGHT else 0.0)
-            else:
-                ratio = self._sled_friction(
-                    self._sled.EvalPoseInWorld(self._context).translation()
-                )
-            if ratio != self._ratios[index]:
-                self._ratios[index] = ratio
-                self._world.AssignRole(
-                    self._world.GetMyMutableContextFromRoot(self._root),
-                    self._plant.get_source_id(), shape, self._material(ratio),
-                    self._geometry.RoleAssign.kReplace,
-                )  # fmt: skip
 
     def _update_feet(self) -> None:
         """Count slip as L2 does, and prepare film and ground below feet in the air."""
         count = len(self._tips)
         places = self._tip_places() - self._shear[:count, :2]  # bristles lag behind the foot
         moved = np.linalg.norm(places - self._last, axis=1)
-        self._last, moved_ground = places, False
+        self._last = places
         for index, state in enumerate(self.feet):
             x, y = places[index]
             state.wet = self._floor.wet(x, y)
             above = self._heights[index] - self._ground[index]
             if self._loads[index] <= LIGHT:
                 if above > _SHALLOW and self._ground[index] != self._floor.height(x, y):
-                    self._ground[index], moved_ground = self._floor.height(x, y), True
+                    self._ground[index] = self._floor.height(x, y)
                 if above > CLEAR:
                     self._films[index].touch_down(self._floor.depth(x, y))
             elif self._loads[index] > SLIP_LOAD and moved[index] > SLIP_SPEED * self.period:
                 state.slip_path += float(moved[index])
-        if moved_ground and self._contact.kind != 'bristles':
-            self._level()
         angles = self._plant.GetPositions(self._context)[self._places]
         up = self._trunk.EvalPoseInWorld(self._context).rotation().matrix()[2, 2]
         if not up > math.cos(TIPPED):

@@ -16,7 +16,7 @@ from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import LeggedBody, Scene
-from studies.work_precision.walk.drake import Contact, DrakeRobot
+from studies.work_precision.walk.drake import DrakeRobot
 from studies.work_precision.walk.walkers import (
     CYCLES,
     HEXAPOD,
@@ -72,31 +72,22 @@ def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
 def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     """Return the available walkers, and the names of the references and the baseline of times."""
     walkers = []
-    forms = {'L1': (False, False, False), 'L1, soles turn': (False, True, False)}
-    if importlib.util.find_spec('numba'):
-        forms['L1, compiled'] = (True, False, False)
-        forms['L1, compiled, walk'] = (True, False, True)
-    for family, (compiled, turning, at_once) in forms.items():
-        for step in (1e-3, 4e-3, 1e-2):
-            walkers.append(_planar(family, step, compiled, turning, at_once))
+    forms = {'L1': False} | ({'L1, compiled': True} if importlib.util.find_spec('numba') else {})
+    for family, compiled in forms.items():
+        walkers += [_planar(family, step, compiled) for step in (1e-3, 4e-3, 1e-2)]
     if not importlib.util.find_spec('mujoco'):
-        top = _planar('L1', TOP_STEP, False, False, False)
+        top = _planar('L1', TOP_STEP, False)
         return [*walkers, top], (top.name,), named('L1', SAMPLE)
     steps = (5e-4, 1e-3, 2e-3, 4e-3)
     walkers += [_full('L2', replace(RECOMMENDED, timestep=step)) for step in steps]
-    stiff = replace(RECOMMENDED, impratio=10.0, noslip_iterations=5)
-    walkers += [_full(STIFF, replace(stiff, timestep=step)) for step in steps[1:]]
     walkers += [
         _full('MuJoCo defaults', replace(MUJOCO_DEFAULTS, timestep=step), ours=False)
         for step in (5e-4, 2e-3)
     ]
     baseline = named('L2', RECOMMENDED.timestep)
     if importlib.util.find_spec('pydrake'):
-        tops: tuple[Walker, ...] = (
-            _full(TOP, replace(RECOMMENDED, timestep=1e-4)),
-            _drake('bristles', 1e-4),
-        )
-        walkers += [_drake(kind, step) for kind, steps in DRAKE_STEPS.items() for step in steps]
+        tops: tuple[Walker, ...] = (_full(TOP, replace(RECOMMENDED, timestep=1e-4)), _drake(1e-4))
+        walkers += [_drake(step) for step in (2e-4, 4e-4)]
     else:
         # The finer one shows the uncertainty of the reference.
         walkers.append(_full(TOP, replace(RECOMMENDED, timestep=TOP_STEP / 2.0)))
@@ -104,32 +95,17 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     return [*walkers, *tops], tuple(top.name for top in tops), baseline
 
 
-TOP, STIFF = 'L2, top', 'L2, noslip'
-DRAKE = {
-    'bristles': 'Drake, force elements',
-    'sap': 'Drake, SAP',
-    'lagged': 'Drake, lagged',
-    'tamsi': 'Drake, TAMSI',
-}
-DRAKE_STEPS = {
-    'bristles': (2e-4, 4e-4),
-    'sap': (1e-3, 2e-3),
-    'lagged': (5e-4, 1e-3, 2e-3),
-    'tamsi': (1e-3, 2e-3),
-}
+TOP, DRAKE = 'L2, top', 'Drake, force elements'
 
 
-def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bool) -> Walker:
+def _planar(family: str, step: float, compiled: bool) -> Walker:
     def walk(case: Walk) -> Walked:
         floor = case.scene.floor.build(case.seed)
-        robot = PlanarRobot(case.scene, floor, step, compiled, turning)
+        robot = PlanarRobot(case.scene, floor, step, compiled)
         pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / step)
         start = time.process_time()
-        if at_once:
-            count = robot.walk(pressures, count)
-        else:
-            for _ in range(count):
-                robot.step(pressures)
+        for _ in range(count):
+            robot.step(pressures)
         return walked(robot, case.scene, count, time.process_time() - start)
 
     return Walker(family, named(family, step), step, walk)
@@ -148,13 +124,12 @@ def _full(
     return _sampled(family, settings.timestep, make, ours)
 
 
-def _drake(kind: str, step: float, turning: bool = True) -> Walker:
+def _drake(step: float, turning: bool = True) -> Walker:
     def make(case: Walk) -> DrakeRobot:
-        floor, contact = case.scene.floor.build(case.seed), Contact(kind, turning=turning)
-        return DrakeRobot(case.scene, floor, SAMPLE, step, contact)
+        floor = case.scene.floor.build(case.seed)
+        return DrakeRobot(case.scene, floor, SAMPLE, step, float(turning))
 
-    family = DRAKE[kind] if turning else f'{DRAKE[kind]}, {FREE}'
-    return _sampled(family, step, make, False)
+    return _sampled(DRAKE if turning else f'{DRAKE}, {FREE}', step, make, False)
 
 
 def _sampled(family: str, step: float, make: Callable[[Walk], Any], ours: bool) -> Walker:
@@ -213,10 +188,9 @@ def towing_walkers() -> list[Walker]:
     """Return L1, L2 and Drake, with soles that resist turning and with those that do not."""
     fine = replace(RECOMMENDED, timestep=TOP_STEP)
     return [
-        *(_planar(family, SAMPLE, False, turns, False)
-          for family, turns in (('L1', False), ('L1, soles turn', True))),
+        _planar('L1', SAMPLE, False),
         _full('L2', fine),
         _full(f'L2, {FREE}', fine, turning=False),
-        _drake('bristles', 2e-4),
-        _drake('bristles', 2e-4, turning=False),
+        _drake(2e-4),
+        _drake(2e-4, turning=False),
     ]  # fmt: skip

@@ -18,7 +18,6 @@ from studies.work_precision.walk.walkers import CYCLES, RAIL, Walk, Walked, Walk
 
 LEG = 'RailLeg, 4 ms'
 EVENTS = 'solve_ivp, events, 1e-11'
-_SMOOTH = 1e-3  # m/s: slip speed below which the smoothed friction is viscous
 
 
 def rail_walks() -> list[Walk]:
@@ -45,14 +44,8 @@ def rail_walkers() -> list[Walker]:
     for family, method, tolerance in (
         (EVENTS, 'DOP853', 1e-11),
         ('solve_ivp, events, 1e-6', 'RK45', 1e-6),
-        ('solve_ivp, events, 1e-3', 'RK45', 1e-3),
     ):
         walkers.append(Walker(family, family, None, _by_events(method, tolerance), ours=False))
-    for family, method in (
-        ('solve_ivp, smoothed, LSODA', 'LSODA'),
-        ('solve_ivp, smoothed, RK45', 'RK45'),
-    ):
-        walkers.append(Walker(family, family, None, _by_smoothing(method), ours=False))
     return walkers
 
 
@@ -222,29 +215,3 @@ def walk_by_events(case: Walk, method: str, tolerance: float) -> tuple[float, fl
         distance += speed * coasting - 0.5 * drag / mass * coasting**2
         speed = speed - drag / mass * coasting if coasting == gait.swing else 0.0
     return distance, slip, steps
-
-
-def _by_smoothing(method: str) -> Callable[[Walk], Walked]:
-    """Walk with one call of solve_ivp: default tolerances, friction c tanh(slip/v)."""
-
-    def walk(case: Walk) -> Walked:
-        scene, body, gait = case.scene, case.scene.body, case.scene.gait
-        assert isinstance(body, RailBody) and isinstance(gait, RailGait)
-        cap, peak = cap_in_stance(case), 0.5 * math.pi * gait.stroke / gait.stance
-
-        def motion(t: float, state: Any) -> tuple[float, float, float]:
-            speed, since = float(state[1]), t % gait.cycle
-            force, slip = -body.rolling_drag * math.tanh(speed / _SMOOTH), 0.0
-            if since < gait.stance:
-                slip = speed - peak * math.sin(math.pi * since / gait.stance)
-                force -= cap(since) * math.tanh(slip / _SMOOTH)
-            return speed, force / body.mass, abs(slip)
-
-        start = time.perf_counter()
-        found = solve_ivp(motion, (0.0, scene.duration), (0.0, 0.0, 0.0), method=method)
-        taken = time.perf_counter() - start
-        distance, _, slip = (found.y[:, -1] / scene.cycles).tolist()
-        verdict = None if found.success else str(found.message)
-        return Walked(distance, slip, 0.0, 0.0, verdict, len(found.t) - 1, taken)
-
-    return walk

@@ -14,10 +14,7 @@ event-driven integration of its equations of motion, phase by phase, to 1e-11.
 
 Times are those of the steps alone: making the robot is not timed, nor are requests for the state
 of the feet (L2 computes this state in every step, L1 only on request). Drake is stepped from
-Python, which writes forces or coefficients of friction before each step.
-
-Of the laws in studies.work_precision.friction, the hexapod walks only with the elastic one. The
-study stability compares the others.
+Python, which writes forces before each step.
 """
 
 from __future__ import annotations
@@ -49,7 +46,7 @@ def measure(progress: Progress, cycles: int | None = None) -> list[WalkResult]:
     )  # fmt: skip
     if len(tops) > 1:  # there is Drake
         towers = towing_walkers()
-        two = towers[2].name, towers[4].name
+        two = towers[1].name, towers[3].name
         results += run(
             TOWING, towing_walks(), towers, two, two[0], lambda done: progress(0.7 + 0.2 * done),
             cycles,

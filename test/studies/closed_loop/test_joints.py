@@ -83,4 +83,4 @@ def test_a_walk_without_markers_is_measured_against_the_truth():
     assert markers.distance == pytest.approx(walk.distance, abs=1e-9)  # flat feet decide nothing
     figures = {'flat': {'markers': joints.summary([markers]), 'joints': row}}
     document = {'scenes': {'hexapod_patches': figures}}
-    assert '(100.0 %)' in joints.table(document).splitlines()[1]
+    assert 'hexapod_patches' in joints.table(document).splitlines()[1]

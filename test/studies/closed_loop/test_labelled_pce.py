@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 
-from ros_pad.errors import InvalidInput
 from studies import samples
 from studies.__main__ import main
 from studies.closed_loop import labelled_contacts as contacts
@@ -50,16 +49,6 @@ def test_zero_is_slip_under_load_and_no_contact_without(tmp_path):
     assert found.quiet_minutes == pytest.approx(3 * 0.35 / 60.0, rel=0.01)  # 50 ms clear of slips
 
 
-def test_speed_by_an_imu_forgets(tmp_path):
-    """A constant acceleration a gives a τ (1 - exp(-t/τ)) from its start, in stance only."""
-    found = study.read_atlas(atlas(tmp_path / 'ATLAS_x.csv'))
-    speed = study.inertial_speed(found)
-    end = study.FORGET * (1.0 - np.exp(-0.2 / study.FORGET))
-    assert speed[799] == pytest.approx(end, rel=0.01)
-    assert not speed[:600].any()
-    assert not speed[800:1000].any()
-
-
 @pytest.mark.parametrize(
     # Wilson's interval as in Newcombe, Statistics in Medicine 17 (1998) 857, Table I, method 3.
     ('hits', 'count', 'expected'),
@@ -67,16 +56,6 @@ def test_speed_by_an_imu_forgets(tmp_path):
 )
 def test_interval_of_a_share(hits, count, expected):
     assert samples.share_interval(hits, count) == pytest.approx(expected, abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    ('text', 'says'), [('1,2,3\n4,5,6\n', '13 columns are needed'), (None, 'no such file')]
-)
-def test_what_is_no_recording_is_refused(tmp_path, text, says):
-    if text:
-        (tmp_path / 'x.csv').write_text(text)
-    with pytest.raises(InvalidInput, match=says):
-        study.read_atlas(tmp_path / 'x.csv')
 
 
 def test_a_folder_of_made_up_feet(tmp_path, capsys, monkeypatch):

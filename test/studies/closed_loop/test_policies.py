@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from ros_pad.control import policy_named
 from ros_pad.control.policies import Choice, LiftOff
 from ros_pad.simulation import Scene
-from studies.closed_loop import policies, quick_walk, rivals
+from studies.closed_loop import policies, rivals
 
 STEP = LiftOff(1, 'flat', 9, False, 0.5, (0.0, 0.0), False)
 
@@ -32,25 +31,6 @@ def test_held_out_grounds_share_no_condition_with_tuning_grounds():
 def test_ratio_by_hand():
     result = policies.ratio([100.0, 98.0], [100.0, 100.0])
     assert result == {'of_means': 0.99, 'low': 0.98, 'high': 1.0, 'least': 0.98, 'behind': 0.5}
-
-
-def test_walks_that_are_kept_are_not_made_again(tmp_path, monkeypatch):
-    made = []
-
-    def in_processes(task, cases, *_):
-        made.extend(job for job, _, _ in cases)
-        return [task(*case) for case in cases]
-
-    monkeypatch.setattr(policies.command, 'in_processes', in_processes)
-    monkeypatch.setattr(policies, 'walk', lambda job: [0.1, job.seed, None])
-    jobs = [policies.Job('as shipped', 'flat', 1.0, seed, 2) for seed in (1, 2)]
-    kept = tmp_path / 'walks.jsonl'
-    policies.walked(jobs[:1], kept, 1)
-    assert policies.walked(jobs, kept, 1) == {jobs[0]: [0.1, 1, None], jobs[1]: [0.1, 2, None]}
-    assert made == jobs
-    monkeypatch.setattr(policies, '_code', lambda policy: 'another')
-    policies.walked(jobs, kept, 1)
-    assert made == [*jobs, *jobs]
 
 
 def test_the_page_has_the_tables_of_the_last_run():
@@ -83,16 +63,3 @@ def test_a_bandit_takes_the_morphology_that_goes_further_and_tries_the_other():
         chosen.append(morphology)
         before, x = x, x + (0.13 if morphology == 'flat' else 0.02)
     assert 0.7 < chosen.count('flat') / 300 < 1.0
-
-
-def test_a_walk_without_dynamics_goes_as_far_as_one_with_dynamics():
-    """From docs/charts/policies.json: fixed morphologies in L2, within 3 %, mm a cycle."""
-    scene = replace(Scene.load(policies.SCENE), cycles=12)
-    for kind, policy, expected in (
-        ('wet', 'flat', 81.5), ('wet', 'dome', 139.7), ('dry', 'flat', 127.1),
-        ('dry', 'dome', 97.9),
-    ):  # fmt: skip
-        ground = replace(scene, floor=replace(scene.floor, kind=kind))
-        distance, switches = quick_walk.walk(ground, policy_named(policy), policy, 0)
-        assert 1e3 * distance == pytest.approx(expected, rel=0.03)
-        assert switches == 0

@@ -12,7 +12,7 @@ def test_two_signals_end_a_node_in_order():
     tries = list(signals.run('recorder', 1, 3.0))
     assert [one.pair for one in tries] == list(signals.PAIRS)
     assert not any(one.problems for one in tries)
-    assert 'recorder        3     3' in signals.table(tries)
+    assert signals.table(tries).splitlines()[1].split()[:3] == ['recorder', '3', '3']
 
 
 def test_what_is_wrong_is_found(tmp_path: pathlib.Path):

@@ -54,15 +54,6 @@ def test_feet_slide_as_they_should_under_the_same_body(log):
     np.testing.assert_array_equal(slid.accelerometer, log.accelerometer)
 
 
-def test_forces_are_cut_to_their_noise_for_some_time(log):
-    course = walks.Course()
-    cut = stability.unloaded(log, course, (3.0, 4.5), 0.5)
-    none = (np.abs(log.time - 3.25) < 0.24) | (np.abs(log.time - 4.75) < 0.24)
-    assert cut.foot_forces[none].std() == pytest.approx(course.noise.force, rel=0.1)
-    rest = (log.time < 3.0) | (log.time > 5.1)
-    np.testing.assert_array_equal(cut.foot_forces[rest], log.foot_forces[rest])
-
-
 def test_the_law_of_low_rates_grows_with_the_step(log, monkeypatch):
     monkeypatch.setattr(stability, 'SETTLED', 3.0)
 
@@ -93,7 +84,6 @@ def test_while_all_feet_slip_the_accelerometer_carries_the_velocity_on(monkeypat
     assert not any(best.silent)
     for rival in ('no rejection', 'invariant', 'odometry'):
         assert stability.first(found[rival], found[rival].error, 0.08) < 0.3
-    assert 'all feet slip apart: error of v x y' in stability.table(curves)
 
 
 def test_all_walks_and_failures_run_to_the_end(monkeypatch, tmp_path, capsys):
@@ -112,8 +102,7 @@ def test_all_walks_and_failures_run_to_the_end(monkeypatch, tmp_path, capsys):
     words = ['--all', '--picture', '--seeds', '2', '--duration', '6', '--out', str(tmp_path)]
     assert study.main(words) == 0
     out = capsys.readouterr().out
-    assert 'dry              invariant, χ²' in out
-    assert 'low rates: error of v x y' in out
+    assert '| dry | ' in out
     assert '| low rates, Hz | 500; doubt 500 | 500; doubt 500 |' in out
     curves = json.loads((tmp_path / 'sensing_stability.json').read_text())['curves']
     assert curves[0]['error'] == pytest.approx([np.sqrt(0.025)] * 5)

@@ -12,8 +12,9 @@ from ros_pad import configuration
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation import Scene
-from studies.thesis import bench_scene as bench
-from studies.thesis.bench_scene import BENCHES, BenchScene
+from studies.thesis.bench_scene import BenchScene
+
+BENCHES = ('inflation', 'press', 'tangential', 'foot')
 
 FOLDER = configuration.shared_folder() / 'scenes'
 FILES = {kind: yaml.safe_load((FOLDER / f'bench_{kind}.yaml').read_text()) for kind in BENCHES}
@@ -34,16 +35,6 @@ def written(folder, kind, *changes):
     file = folder / 'mine.yaml'
     file.write_text(yaml.safe_dump(values))
     return file
-
-
-@pytest.mark.parametrize('kind', BENCHES)
-def test_shipped_scenes(kind):
-    scene = BenchScene.load(f'bench_{kind}')
-    assert scene.source == scene.name == f'bench_{kind}'
-    assert scene.setup.kind == kind
-    assert scene.description
-    assert scene.measurements.is_file()
-    assert (scene.pad.radius, scene.pad.stiffness) == (1.5e-3, 40.0)
 
 
 def test_values_come_where_they_belong():
@@ -76,38 +67,18 @@ def test_a_walk_is_no_bench_and_a_bench_is_no_walk():
         Scene.load('bench_press')
 
 
-@pytest.mark.parametrize('name', configuration.names('scenes'))
-def test_every_scene_is_of_one_kind(name):
-    scene = bench.load(name)
-    assert isinstance(scene, BenchScene if name.startswith('bench_') else Scene)
-    assert scene.name == name and scene.description
-
-
 BAD = [
     ('inflation', 'bench', 'drag', "bench = 'drag' is not allowed: one of inflation, press, tang"),
     ('inflation', 'highest_pressure', 160e3, 'highest_pressure = 160000.0 is not allowed: a numb'),
-    ('inflation', 'claimed_error', -0.1, 'claimed_error = -0.1 is not allowed'),
     ('inflation', 'pressure', 75e3, "unknown key 'pressure'"),
     ('inflation', 'measurements', 'thesys', "measurements = 'thesys': there is no file"),
-    ('inflation', 'foot', 'large91', "foot: no foot named 'large91'"),
     ('press', 'pressure', 91.4e3, 'pressure = 91400.0 is not allowed: a number from 1000 to 913'),
-    ('press', 'highest_force', 0.54, 'highest_force = 0.54 is not allowed'),
     ('press', 'text_forces.second', ..., "text_forces: key 'second' is missing"),
-    ('press', 'text_forces.fourth', 0.4, "text_forces: unknown key 'fourth'"),
-    ('tangential', 'speed', 0.0, 'speed = 0.0 is not allowed'),
     ('tangential', 'dwell', ..., "key 'dwell' is missing"),
     ('tangential', 'floor.receding_angle', 2.2, 'floor: receding_angle = 2.2 is not allowed'),
-    ('tangential', 'floor.kind', 'wet', "floor: unknown key 'kind'"),
     ('tangential', 'design.largest_radius', 1e-4, 'design: largest_radius = 0.0001 is not allo'),
-    ('tangential', 'design.claimed_largest', 1e-2, 'design: claimed_largest = 0.01 is not allow'),
     ('foot', 'criterion', 'measured', "criterion = 'measured': domes of 50000 Pa carry nothing"),
-    ('foot', 'criterion', 'highest', "criterion = 'highest' is not allowed: one of"),
     ('foot', 'highest_load', 3.4, 'highest_load = 3.4 is not allowed: a number from 0.001 to 3.3'),
-    ('foot', 'lowest_load', 1.6, 'lowest_load = 1.6 is not allowed: a number from 0.0001 to 1.5'),
-    ('foot', 'pressure', 91e3, 'pressure = 91000.0 is not allowed'),
-    ('foot', 'doubt.samples', 3, 'doubt: samples = 3 is not allowed'),
-    ('foot', 'doubt.factor', 0.5, 'doubt: factor = 0.5 is not allowed'),
-    ('foot', 'floor.roughness', -1e-6, 'floor: roughness = -1e-06 is not allowed'),
     ('foot', 'claimed_highest', 0.1, 'claimed_highest = 0.1 is not allowed'),
 ]
 
@@ -118,18 +89,6 @@ def test_bad_scenes(tmp_path, kind, path, value, message):
     with pytest.raises(ConfigError, match=re.escape(message)) as caught:
         BenchScene.load(file)
     assert str(caught.value).startswith(str(file))
-
-
-def test_the_pressure_ends_where_the_model_of_the_pad_does(tmp_path):
-    """The model ends at 3.426 k/r less adhesion, 91.34 kPa; BAD has a pressure above it."""
-    file = written(tmp_path, 'press', ('pressure', 91.3e3))
-    assert BenchScene.load(file).setup.pressure == 91.3e3
-
-
-def test_text_forces_may_be_missing(tmp_path):
-    assert (
-        BenchScene.load(written(tmp_path, 'press', ('text_forces', ...))).setup.text_forces == ()
-    )
 
 
 def test_files_of_ones_own_lie_beside_the_scene(tmp_path, monkeypatch):
@@ -154,10 +113,3 @@ def test_the_bench_of_a_foot_refuses_a_capillary_force():
     foot = dataclasses.replace(Foot.load('large19'), capillary_force=2e-5)
     with pytest.raises(ConfigError, match=r'capillary_force = 2e-05 N is not allowed: 0 is'):
         BenchScene.load('bench_foot', foot)
-
-
-def test_another_foot_in_place_of_the_scenes_own():
-    foot = Foot.load('large37')
-    assert BenchScene.load('bench_press', foot).foot == foot
-    assert BenchScene.load('bench_tangential', foot).foot.sole_radius == foot.sole_radius
-    assert BenchScene.load('bench_tangential', foot).foot.pads == 1

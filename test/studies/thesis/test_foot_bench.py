@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from studies.thesis import bench, foot_bench
 from studies.thesis.bench_scene import BenchScene
-from studies.thesis.foot_bench import DOME, FLAT, LINES, NONE, ROUGH, SMOOTH, SUCTION, Pulled
+from studies.thesis.foot_bench import DOME, FLAT, ROUGH, SMOOTH
 
 REFERENCE = pathlib.Path(__file__).parents[2] / 'reference' / 'free_dome.json'
 SCENE = BenchScene.load('bench_foot')
@@ -68,7 +68,7 @@ def onset(load, morphology, critical, conforming):
 
 @pytest.mark.parametrize('morphology', [FLAT, DOME])
 @pytest.mark.parametrize(('floor', 'coarser'), [(SMOOTH, 1.0), (ROUGH, COARSER)])
-@pytest.mark.parametrize('load', [0.25, 1.0, 3.0])
+@pytest.mark.parametrize('load', [0.25, 3.0])
 def test_wet_forces(morphology, floor, coarser, load):
     expected = onset(load, morphology, 0.5e-6 * coarser, CONFORMING * coarser)
     assert pull(morphology, floor, load).wet == pytest.approx(expected, rel=1e-5)
@@ -88,37 +88,13 @@ def test_bounds_on_the_force_of_the_liquid():
     assert least < dome.suction < 1.2 * least
 
 
-def test_kinds_add_up():
-    each = Pulled(dry=2.0, wet=1.5, lines=0.25, suction=1.0)
-    assert [each.less_dry(kind) for kind in (NONE, LINES, SUCTION)] == [-0.5, -0.25, 0.75]
-
-
-@pytest.mark.parametrize(('boundary', 'sign'), [(0.9, -1.0), (1.0, 0.0), (1.1, 1.0)])
-def test_without_capillary_force_the_sign_is_that_of_boundary_less_dry_friction(boundary, sign):
-    """So no dome gains from a film in this model unless the film rubs more than dry contact."""
-    dry = MU + SHEAR / PRESSURE
-    foot = dataclasses.replace(SCENE.foot, boundary_friction=boundary * dry)
-    less = foot_bench.pull(foot, SCENE.setup, 3.0, DOME).less_dry(NONE)
-    assert less == pytest.approx(0.0, abs=1e-5) if sign == 0.0 else sign * less > 1e-3
-
-
-def test_a_line_by_hand():
-    """Of (0, 0), (1, 0), (2, 3) the line is 1.5 x − 0.5, and off by 1 of 3 in the middle."""
-    line = foot_bench.straight(np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.0, 3.0]))
-    assert line == pytest.approx((1.5, -0.5, 1.0 / 3.0))
-
-
-def test_an_intercept_of_zero_has_no_sign():
-    line = foot_bench.straight(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 3.0 + 1e-12]))
-    assert str(line.intercept) == '0.0'
-
-
 def test_draws_are_within_the_factor_and_fixed_by_the_seed():
     drawn = foot_bench.draws(SCENE.foot, SCENE.setup)
     assert len(drawn) == 200
     assert drawn == foot_bench.draws(SCENE.foot, SCENE.setup)
     other = dataclasses.replace(SCENE.setup, seed=2)
-    assert drawn != foot_bench.draws(SCENE.foot, other)
+    again = foot_bench.draws(SCENE.foot, other)
+    assert [foot.friction for foot, _, _ in drawn] != [foot.friction for foot, _, _ in again]
     friction = np.array([foot.friction for foot, _, _ in drawn]) / MU
     depth = np.array([setup.film_thickness for _, setup, _ in drawn]) / DEPTH
     lines = np.array([factor for _, _, factor in drawn])
@@ -129,23 +105,6 @@ def test_draws_are_within_the_factor_and_fixed_by_the_seed():
     pads = [foot.pads for foot, _, _ in drawn]
     assert min(pads) >= 10 and max(pads) <= 38
     assert {setup.speed for _, setup, _ in drawn} == {SPEED}
-
-
-def test_no_doubt_leaves_an_interval_of_no_width():
-    sure = dataclasses.replace(SCENE.setup, factor=1.0, samples=20)
-    trial = bench.run(dataclasses.replace(SCENE, setup=sure))
-    for load in (0.25, 3.0):
-        rows = trial.pick('wet less dry', condition='dome, smooth, no capillary force')
-        foot, *ends = (row.modelled for row in rows if row.force == load)
-        assert ends == pytest.approx([foot, foot], rel=1e-9)
-
-
-def test_intervals_contain_what_is_assumed():
-    for condition in ('flat, smooth, pinned lines', 'dome, rough, no capillary force'):
-        rows = TRIAL.pick('wet less dry', condition=condition)
-        for load in (0.25, 3.0):
-            foot, low, high = (row.modelled for row in rows if row.force == load)
-            assert low < foot < high
 
 
 def test_estimates_of_the_thesis():
@@ -176,14 +135,6 @@ def test_a_film_that_rubs_enough_settles_the_sign():
     shares = trial.pick('share of draws above 0', condition='flat, smooth')
     assert [row.modelled for row in shares] == [1.0] * 4
     assert trial.claims[1].holds is True
-
-
-def test_domes_of_one_criterion_or_another_hold_the_same():
-    """Below its limit the criterion does not enter: every dome carries its share."""
-    foot = dataclasses.replace(SCENE.foot, limit='max_depth')
-    assert foot_bench.pull(foot, SCENE.setup, 3.0, DOME) == pull(DOME, SMOOTH, 3.0)
-    line = dataclasses.replace(SCENE.foot, limit='measured')
-    assert line.dome_load(3.0, PRESSURE) == 0.0
 
 
 def test_liquid_that_reaches_the_base_of_the_pads_has_no_estimate_by_layers():

@@ -3,24 +3,15 @@
 
 import math
 
-import matplotlib
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from ros_pad.contact import WATER
-from ros_pad.reports.style import PAPER_STYLE, WIDE
 from studies.thesis import liquid as figures
 
 pytestmark = pytest.mark.slow
 
 FIGURES = {each.number: each for each in figures.draw()}
-
-
-def test_only_what_is_asked_for_is_drawn():
-    assert tuple(FIGURES) == figures.NUMBERS
-    assert [each.number for each in figures.draw((29, 14))] == [29]
-    assert figures.draw((14,)) == []
 
 
 def test_exact_curvature_is_that_of_the_surface():
@@ -47,21 +38,6 @@ def test_pull_on_one_half_is_what_half_the_liquid_needs():
     suction = 9810.0 * float(np.mean(levels * (outer - wall))) * found.height
     expected = 2.0 * (0.004 * (found.radius - longer) - suction)
     assert figures.one_sided(found, liquid) == pytest.approx(expected, rel=2e-3)
-
-
-def test_curves_run_from_90_to_0_degrees():
-    ax = FIGURES[29].drawn.figure.axes[0]
-    curves = [line for line in ax.lines if line.get_marker() == 'None']
-    points = [line for line in ax.lines if line.get_marker() == 'o']
-    assert len(curves) == 6 and len(points) == 12
-    for line, tension in zip(curves, (1.6, 1.6, 2.0, 2.0, 4.0, 4.0), strict=True):
-        x = line.get_xdata()
-        assert (x[0], x[-1]) == pytest.approx((tension / 4.0, tension))
-    for balance in curves[::2]:
-        assert np.all(np.diff(balance.get_ydata()) > 0.0)
-    # At the exact points, drawn as discs, the energy balance is up to 16 % higher.
-    x, y = points[-3].get_xydata()[0]
-    assert 1.0 < np.interp(x, *curves[4].get_xydata().T) / y < 1.16
 
 
 def test_radius_is_in_proportion_on_a_cone_alone():
@@ -101,16 +77,3 @@ def test_what_is_stated(agree):
     agree(claims)
     assert all(math.isfinite(each) for claim in claims for each in claim.numbers)
     assert [claim.holds for claim in FIGURES[29].claims] == [True, True, False]
-
-
-@pytest.mark.parametrize('number', figures.NUMBERS)
-def test_nothing_is_cut_off(number):
-    figure = FIGURES[number].drawn.figure
-    canvas = FigureCanvasAgg(figure)
-    with matplotlib.rc_context(PAPER_STYLE):
-        canvas.draw()
-        box = figure.get_tightbbox(canvas.get_renderer())
-    width, height = figure.get_size_inches()
-    assert width <= WIDE
-    assert box.x0 > -0.01 and box.y0 > -0.01
-    assert box.x1 < width + 0.01 and box.y1 < height + 0.01

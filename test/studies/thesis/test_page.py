@@ -14,7 +14,9 @@ from studies.thesis.explained import Claim
 pytestmark = pytest.mark.slow
 
 CHEAP = (10, 14, 15, 16, 17, 18, 20, 21, 28, 34)
-TEXT = Claim(0, 'It is more.', 'It is less.', (0.9,), False, '3.1')
+TEXT = Claim(
+    figure=0, thesis='It is more.', ours='It is less.', numbers=(0.9,), holds=False, section='3.1'
+)
 FIGURES = thesis_page.draw(CHEAP)
 
 
@@ -48,7 +50,7 @@ def test_page(tmp_path):
     for each in FIGURES:
         assert f'<h2 id="figure-{each.number}">' in text
         assert f'<a href="#figure-{each.number}">' in text
-        for words in (each.measured, each.modelled, each.assumed):
+        for words in each.parts.values():
             assert len(words) > 10 and html.escape(words) in text
         for claim in each.claims:
             assert html.escape(claim.thesis) in text and html.escape(claim.ours) in text

@@ -63,9 +63,7 @@ def test_the_design_pressure_inflates_to_one_and_a_half_radii():
 
 
 @pytest.mark.parametrize('reading', READINGS)
-@pytest.mark.parametrize(
-    'radius', [0.05, 0.3, 0.5, 0.566, 0.57, 0.8, 1.0, 1.5, 2.0, 2.35, 2.5, 2.9, 3.0, 5.0, 20.0]
-)
+@pytest.mark.parametrize('radius', [0.05, 0.566, 1.0, 2.5, 20.0])
 def test_rise_is_the_only_root_of_3_101(radius, reading):
     roots = rise_by_polynomial(radius, reading)
     (height,) = rise(np.array([radius * 1e-3]), DESIGN_WATER, reading)
@@ -75,11 +73,3 @@ def test_rise_is_the_only_root_of_3_101(radius, reading):
         return
     assert len(roots) == 1
     assert height == pytest.approx(roots[0] * 1e-3, rel=1e-12)
-
-
-def test_rise_as_printed_has_its_maximum_far_from_the_claimed_optimum():
-    r = np.linspace(0.3e-3, 4e-3, 3701)
-    typed = rise(r, DESIGN_WATER, 'thesis')
-    assert np.isnan(typed[r < 0.565e-3]).all()
-    assert np.isfinite(typed[r > 0.566e-3]).all()
-    assert r[np.nanargmax(typed)] == pytest.approx(2.675e-3, abs=0.01e-3)

@@ -20,7 +20,7 @@ from studies.thesis.explained import (
 )
 
 CLAIMS = statements.claims()
-CLAIM = Claim(20, 'more', 'less', (1.0,), True, '3.2.2')
+CLAIM = Claim(figure=20, thesis='more', ours='less', numbers=(1.0,), holds=True, section='3.2.2')
 
 
 @pytest.mark.parametrize(

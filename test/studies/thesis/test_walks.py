@@ -3,7 +3,6 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from ros_pad.simulation import Scene
@@ -44,27 +43,11 @@ def swapped(walked, one, other):
     return walked | {one: walked[other], other: walked[one]}
 
 
-def test_each_figure_names_the_walks_that_it_needs():
-    assert walks.scenes((38,)) == walks.scenes((38, 39)) == [(name, 0) for name in walks.RAIL]
-    assert {name for name, _ in walks.scenes((41, 43))} == {
-        f'hexapod_rough_{case}' for case in walks.CASES
-    }
-    assert {name for name, _ in walks.scenes((42,))} == {
-        f'hexapod_smooth_{case}' for case in walks.CASES
-    }
-    assert walks.scenes(()) == []
-
-
 def test_short_walks_have_the_verdicts_of_the_docs(walked, agree):
     """The study walks longer, and on three floors."""
     for number in (38, 39, 42, 44):
         (found,) = walks.draw(walked, (number,))
         agree(found.claims)
-
-
-def test_claims_of_the_thesis_about_the_rail_hold(walked):
-    assert verdicts(walked, 38) == [True, True, True]
-    assert verdicts(walked, 39) == [True, True, True]
 
 
 def test_walks_that_contradict_the_thesis_do_not_hold(walked):
@@ -105,26 +88,3 @@ def test_figure_39_ends_at_the_goal(walked):
         assert way[-1] == pytest.approx(500.0, abs=1.0)
         assert time[-1] == pytest.approx(walked[name, 0].metrics.time_to_goal_s, abs=0.005)
         assert time[0] <= 0.0
-
-
-def test_figure_38_draws_the_marker(walked):
-    (found,) = walks.draw(walked, (38,))
-    air, standing = found.drawn.figure.axes[1].lines
-    x, z = standing.get_xydata().T
-    known = np.isfinite(x)
-    # In a stance the foot slides 41 of 50 mm backward.
-    assert np.ptp(x[known]) > 35.0 and z[known].max() < 2.0
-    assert np.nanmax(air.get_ydata()) == pytest.approx(20.0, abs=1.0)  # the lift
-
-
-def test_figure_44_draws_each_path(walked):
-    (found,) = walks.draw(walked, (44,))
-    ends = [
-        tuple(line.get_xydata()[0])
-        for line in found.drawn.figure.axes[0].lines
-        if line.get_marker() == 's'
-    ]
-    assert ends == [
-        pytest.approx(tuple(1e3 * walked[f'hexapod_smooth_{case}', SEED].body[-1, :2]))
-        for case in walks.CASES
-    ]

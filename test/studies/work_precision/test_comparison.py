@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
 import warnings
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ros_pad.errors import NoEquilibrium
-from studies.work_precision import comparison
-from studies.work_precision.comparison import Method, Problem, answer, run, table
+from studies.work_precision.comparison import Method, Problem, answer, run
 
 SQUARES = Problem(
     'square root',
@@ -55,20 +53,3 @@ def test_errors_failures_and_wrong_answers_are_separated():
     assert results['silent at 9'].examples[0]['answer'] is None
     assert results['right'].versus == 1.0
     assert results['batch'].us_per_solve < results['right'].us_per_solve
-    text = table(list(results.values()))
-    assert 'square root (4 cases' in text
-    assert all(method.name in text for method in methods)
-
-
-def test_time_is_that_of_one_solution_of_an_ordinary_case(monkeypatch):
-    now = 0.0
-    monkeypatch.setattr(comparison, 'time', SimpleNamespace(perf_counter=lambda: now))
-
-    def slow(square):
-        nonlocal now
-        # Squares of 9 and more are no ordinary cases: their time must not count.
-        now += 2e-3 if square < 9.0 else 50e-3
-        return math.sqrt(square)
-
-    (result,) = run(SQUARES, [Method('slow', slow)], 'slow')
-    assert result.us_per_solve == pytest.approx(2e3)

@@ -8,7 +8,7 @@ import pytest
 
 from ros_pad.contact import LARGE_PAD, force_limit
 from studies.work_precision import contact, measured
-from studies.work_precision.contact import INVENTED, REFUSED, RIGHT, WRONG
+from studies.work_precision.contact import INVENTED, REFUSED, RIGHT
 
 pytestmark = pytest.mark.slow
 
@@ -59,19 +59,6 @@ def test_ours_never_fail_and_are_exact(results):
         assert result.error < (1e-12 if result.problem == 'free dome' else 1e-10)
 
 
-def test_every_method_is_there_with_its_time(results):
-    assert len(results) == 28
-    for result in results.values():
-        assert result.us_per_solve > 0.0
-        assert 0 <= result.wrong <= result.failures <= result.cases
-        assert result.error >= result.median_error >= 0.0
-        base = results[result.problem, result.baseline]
-        assert result.versus == pytest.approx(result.us_per_solve / base.us_per_solve)
-        assert len(result.examples) == min(result.failures, 5)
-    assert results['pressed dome', 'mpmath, as vpasolve'].wrong > 0
-    assert results['pressed dome', contact.BASELINE].failures == 0
-
-
 def test_the_cap_is_as_far_off_as_was_found_elsewhere(results):
     # The gap is 6 % too large at 0.05 of p A and 87 % at 0.6; the sample goes up to 0.999.
     cap = results['gap, against the exact membrane', 'press, spherical cap, batch']
@@ -87,12 +74,6 @@ def test_maps_show_the_wrong_branch_of_general_solvers():
     maps = {each.method: each for each in contact.failure_maps(size=28)}
     ours = maps['press'].outcome
     assert set(np.unique(ours)) == {RIGHT, REFUSED}
-    # Near flattening there are three roots from 53 kPa on, and fsolve reports success for a wrong
-    # one.
-    free = maps['fsolve, start at the free dome']
-    assert (free.outcome == WRONG).any()
-    pressures = np.broadcast_to(free.pressures, free.outcome.shape)[free.outcome == WRONG]
-    assert pressures.min() > 2.0 * LARGE_PAD.stiffness / LARGE_PAD.radius
     assert (maps['brentq, one unknown'].outcome == INVENTED).any()
 
 

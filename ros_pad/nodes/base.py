@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes have in common: parameters, messages, ticks, and their health.
+
+Nodes read the fields that they need in the bytes of a message, and send bytes in which only
+numbers differ: rclpy takes several times as long to convert whole messages.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message, serialize_message
+
+from ros_pad.bags import topics
+from ros_pad.bags.codec import message_type
+from ros_pad.bags.fields import FieldReader, FieldWriter
+from ros_pad.bags.topics import Topic
+from ros_pad.bags.wire import Wire
+from ros_pad.nodes.parameters import Parameter, declare
+from ros_pad.nodes.qos import message_class, publisher, subscription
+from ros_pad.pace import LATE, TICK_PERIOD_NS, Pace
+from ros_pad.records import Block, split
+
+OLDEST = 0.1
+"""Age of the last sample, s, from which a node that needs samples counts as late."""
+
+
+class PadNode(Node):
+    """A node of ros_pad.
+
+    Parameters
+    ----------
+    name : str
+        Its name, unless it is remapped.
+    parameters : sequence of Parameter
+        Its parameters.
+    **kwargs
+        Passed on to `rclpy.node.Node`.
+
+    Attributes
+    ----------
+    values : dict
+        Values of the parameters by name; changes of live ones update it.
+    now_ns : callable
+        Returns the node's time, ns, five times as fast as rclpy does.
+    simulated : bool
+        Whether this is the time of ``/clock``.
+    refused : Counter of str
+        Number of messages that could not be read, by full name of the topic.
+    reported : object
+        What was found when the health was last reported.
+
+    Raises
+    ------
+    ConfigError
+        When a parameter is not allowed.
+    """
+
+    OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+    def __init__(self, name: str, parameters: Sequence[Parameter], **kwargs: Any) -> None:
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        self.prepare()
+        self.values = declare(self, parameters, self.apply)
+        handle = self.get_clock().handle
+        self.now_ns: Callable[[], int] = lambda: int(handle.get_now().nanoseconds)
+        self.simulated: bool = self.get_parameter('use_sim_time').value
+        self.refused: Counter[str] = Counter()
+        self.reported: Any = None
+        self._reason, self._quiet_until = '', 0.0  # of the last refusal
+        self._record_ns = 0  # stamp of the last record that was processed
+        self._pace, self._since_ns, self._counted = Pace(1_000_000_000), self.now_ns(), 0
+        self._send_health = self.output(topics.DIAGNOSTICS)
+
+    def prepare(self) -> None:
+        """Change what is given for the parameters, before they are declared."""
+
+    def apply(self, values: Mapping[str, Any]) -> None:
+        """Live by changed parameters; raise `PadError` if they are not allowed together."""
+
+    # --- messages ------------------------------------------------------------------------------
+
+    def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
+        """Return a function that publishes whole messages, or their bytes."""
+        publish, of_type = publisher(self, topic, leg).publish, message_type(topic.type_name)
+
+        def send(message: Any) -> None:
+            if not isinstance(message, bytes):
+                # rclpy leaves what was in memory between numbers: a trial has the same bytes.
+                message = of_type.encode(of_type.decode(serialize_message(message)))
+            publish(message)
+
+        return send
+
+    def sender(
+        self,
+        topic: Topic,
+        paths: Sequence[str],
+        leg: int | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> Callable[..., None]:
+        """Return a function that sends a message with these numbers, in the order of `paths`.
+
+        The frame is that of the table of topics, other fields are zero; see
+        :class:`ros_pad.bags.fields.FieldWriter`.
+        """
+        publish = publisher(self, topic, leg).publish
+        frame = {topics.FRAME: topic.frame.format(leg=leg)} if topic.frame else {}
+        write = FieldWriter(message_type(topic.type_name), paths, frame | dict(constants or {}))
+        return lambda *values: publish(write(*values))
+
+    def record_output(
+        self, topic: Topic, legs: Sequence[int], fields: Sequence[str] | None = None
+    ) -> Callable[[Block], None]:
+        """Return a function that publishes blocks of records of these legs, with some fields."""
+        assert topic.record
+        encode, publish = Wire(topic.record, legs, fields).encode, publisher(self, topic).publish
+        return lambda block: publish(encode(block))
+
+    def receive_record(
+        self, topic: Topic, legs: Sequence[int], callback: Callable[[Block], object]
+    ) -> None:
+        """Call a function with each block of records of these legs."""
+        assert topic.record
+        self._receive(topic, None, Wire(topic.record, legs).decode, callback)
+
+    def receive(
+        self,
+        topic: Topic,
+        callback: Callable[..., None],
+        paths: Sequence[str] = (),
+        leg: int | None = None,
+    ) -> None:
+        """Call a function with some fields of each message; without paths, with the message."""
+        if paths:
+            read = FieldReader(message_type(topic.type_name), paths)
+            self._receive(topic, leg, read, lambda values: callback(*values))
+        else:
+            kind = message_class(topic.type_name)
+            self._receive(topic, leg, lambda data: deserialize_message(data, kind), callback)
+
+    def _receive(
+        self,
+        topic: Topic,
+        leg: int | None,
+        read: Callable[[bytes], Any],
+        callback: Callable[[Any], object],
+    ) -> None:
+        full_name = self.resolve_topic_name(topic.name(leg))
+
+        def take(data: bytes) -> None:
+            try:
+                content = read(data)
+            except Exception as error:  # rclpy raises various ones
+                self.refuse(full_name, error)
+            else:
+                callback(content)
+
+        subscription(self, topic, take, leg, raw=True)
+
+    def refuse(self, topic: str, error: Exception) -> None:
+        """Count a message of a topic that is refused for the reason in `error`, and warn of it."""
+        self.refused[topic] += 1
+        self._reason = f'{topic}: message refused: {error}'
+        # rclpy's own throttle takes 0.3 ms for each text that it drops.
+        if time.monotonic() > self._quiet_until:
+            self._quiet_until = time.monotonic() + 1.0
+            self.get_logger().warning(f'{self._reason}; {self.refused[topic]} so far')
+
+    # --- time ----------------------------------------------------------------------------------
+
+    def every(self, period: float, callback: Callable[[], None]) -> None:
+        """Call a function every so many seconds of a clock that no change of the time stops."""
+        self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def on_tick(
+        self,
+        callback: Callable[[int], None],
+        period: float = TICK_PERIOD_NS * 1e-9,
+        all_steps: bool = False,
+    ) -> None:
+        """Call a function again and again with the node's time, ns.
+
+        In real time a timer calls it every ``period`` seconds. In simulated time nodes live by the
+        stamps of records, see :meth:`advance`, and ``/clock`` calls it where no records come, or
+        at all steps.
+        """
+        if not self.simulated:
+            self.every(period, lambda: callback(self.now_ns()))
+            return
+
+        def on_clock(seconds: int, fraction: int) -> None:
+            now_ns = seconds * 1_000_000_000 + fraction
+            # Which of a record and the clock of its moment comes first must mean nothing.
+            if all_steps or abs(now_ns - self._record_ns) > TICK_PERIOD_NS:
+                callback(now_ns)
+
+        self.receive(topics.CLOCK, on_clock, topics.CLOCK.values)
+
+    def advance(self, stamp_ns: int, tick: Callable[[int], None]) -> None:
+        """Process the stamp of a record, ns, which is a tick in simulated time."""
+        if self.simulated:
+            self._record_ns = stamp_ns
+            tick(stamp_ns)
+
+    # --- health --------------------------------------------------------------------------------
+
+    def due(self, now_ns: int, found: Any = None) -> bool:
+        """Return whether to report: once a second, and as soon as what was found changes."""
+        due = self._pace.due(now_ns) or found != self.reported
+        self.reported = found
+        return due
+
+    def status(
+        self,
+        name: str,
+        level: bytes,
+        message: str,
+        values: Mapping[str, object] | None = None,
+        part: str = '',
+    ) -> DiagnosticStatus:
+        """Return a status of this node, with values by name, and the part that it is about."""
+        return DiagnosticStatus(
+            name=f'{self.get_name()}: {name}',
+            hardware_id=part,
+            level=level,
+            message=message,
+            values=[KeyValue(key=key, value=str(each)) for key, each in (values or {}).items()],
+        )
+
+    def rate(self, now_ns: int, samples: int, last_ns: int) -> list[DiagnosticStatus]:
+        """Return rate and age of samples, of which so many have come; in real time only."""
+        if self.simulated:
+            return []
+        rate = (samples - self._counted) / (max(1, now_ns - self._since_ns) * 1e-9)
+        self._since_ns, self._counted = now_ns, samples
+        age = (now_ns - last_ns) * 1e-9
+        values = {
+            'samples a second (Hz)': f'{rate:.1f}',
+            'age of the last sample (s)': f'{age:.3f}',
+        }
+        if rate > 0.0 and not -OLDEST < age < OLDEST:
+            text = f'{LATE}, or clocks differ: samples are {age:.3g} s old'
+            return [self.status('rate', self.WARN, text, values)]
+        return [self.status('rate', self.OK, f'{rate:.0f} samples a second', values)]
+
+    def report(self, now_ns: int, statuses: Sequence[DiagnosticStatus]) -> None:
+        """Publish these on ``/diagnostics``, and which messages were refused."""
+        array = DiagnosticArray(status=list(statuses))
+        if self.refused:
+            array.status.append(
+                self.status('refused messages', self.WARN, self._reason, self.refused)
+            )
+        set_stamp(array.header.stamp, now_ns)
+        self._send_health(array)
+
+
+def set_stamp(stamp: Time, time_ns: int) -> None:
+    """Write a time in ns into a stamp; see :func:`ros_pad.records.split`."""
+    stamp.sec, stamp.nanosec = split(time_ns)

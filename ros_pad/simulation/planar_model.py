@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Constants of a planar walk, in named tuples and sequences, because numba takes no objects."""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from typing import Any
+
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.simulation.gait import WalkingGait
+from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.terrain import CELL, WIDTH, Floor
+
+# SI units; most have the names and meanings of the parts of a scene.
+PlanarModel = namedtuple('PlanarModel', 'period settle gait trunk tow foot floor')
+
+# overlap: share of the cycle in which load passes from foot to foot
+PlanarGait = namedtuple(
+    'PlanarGait', 'cycle stride duty lift reach pushes overlap middles heading_gain'
+)
+
+# centre_x, centre_y: of mass, in the body; weight: component normal to the floor; downhill:
+# acceleration along -x; rocks: lets feet in a line carry the body, m², 0 if it must be in balance
+PlanarTrunk = namedtuple(
+    'PlanarTrunk',
+    'home_x home_y centre_x centre_y mass inertia height weight downhill leg_stiffness rocks',
+)
+
+# dry, wet: drag, N, by the ground
+PlanarTow = namedtuple('PlanarTow', 'mass dry wet distance height stiffness')
+
+# capillary: tangential force of the liquid around all domes, N; dome_drain, sole_drain: factors
+# of the growth of 1/h²; limits: force limits, N, every limit_cell from 0 Pa
+PlanarFoot = namedtuple(
+    'PlanarFoot',
+    'friction shear_strength conforming_pressure boundary_friction capillary critical_film'
+    ' film_exponent shear_stiffness turning_radius sole_area dome_drain sole_drain limit_cell'
+    ' limits',
+)
+
+# puddle: 1/h² of standing liquid; wet, heights: maps, [row along y][column along x]
+PlanarFloor = namedtuple(
+    'PlanarFloor',
+    'puddle wet wet_cell wet_x wet_y heights height_cell height_x height_y',
+)
+
+
+def model_of(scene: Scene, floor: Floor, period: float) -> PlanarModel:
+    """Return the constants of a walk of a scene's robot on a floor."""
+    body, gait, tow, slope = scene.body, scene.gait, scene.tow, scene.floor.slope
+    assert isinstance(body, LeggedBody) and isinstance(gait, WalkingGait)
+    foot, viscosity = scene.foot.on_rough(scene.floor.roughness), scene.floor.viscosity
+    down, heights = GRAVITY * math.cos(slope), floor.heights
+    rocks = 1e-9 * max(x * x + y * y for x, y in body.homes)
+    return PlanarModel(
+        period=period,
+        settle=scene.settle,
+        gait=_filled(PlanarGait, gait, reach=gait.reach(), heading_gain=scene.heading_gain),
+        trunk=_filled(
+            PlanarTrunk,
+            body,
+            home_x=tuple(x for x, _ in body.homes),
+            home_y=tuple(y for _, y in body.homes),
+            centre_x=float(body.robot.centre[0]),
+            centre_y=float(body.robot.centre[1]),
+            weight=body.mass * down,
+            downhill=GRAVITY * math.sin(slope),
+            rocks=0.0 if gait.fewest >= 3 and len(gait.middles) > 4 else rocks,
+        ),
+        tow=_filled(
+            PlanarTow,
+            tow,
+            mass=tow.weight / GRAVITY,
+            dry=tow.weight * tow.friction_dry * math.cos(slope),
+            wet=tow.weight * tow.friction_wet * math.cos(slope),
+        ),
+        foot=_filled(
+            PlanarFoot,
+            foot,
+            capillary=foot.pads * foot.capillary_force,
+            dome_drain=4.0 * math.pi * foot.pads / (3.0 * viscosity),
+            sole_drain=4.0 / (3.0 * viscosity * foot.sole_radius**2),
+            limit_cell=foot._limit_cell,
+            limits=foot._limit_table,
+        ),
+        floor=PlanarFloor(
+            puddle=floor.film_thickness**-2 if floor.film_thickness > 0.0 else math.inf,
+            wet=floor.wet_map.tolist(),
+            wet_cell=floor.cell,
+            wet_x=floor.origin[0],
+            wet_y=floor.origin[1],
+            heights=[[0.0]] if heights is None else heights.tolist(),
+            height_cell=CELL,
+            height_x=-1.0,
+            height_y=-WIDTH / 2.0,
+        ),
+    )
+
+
+def _filled(kind: Any, owner: object, **known: Any) -> Any:
+    """Return a named tuple of what is known, and of what an object has by the same names."""
+    others = {name: getattr(owner, name) for name in kind._fields if name not in known}
+    return kind(**known, **others)
