@@ -10,7 +10,7 @@ The surface is a mesh of triangles between a ring on the wall of the pad and a r
 Each vertex moves on a rail, so it has one unknown. Inside the surface the rail is the normal; far
 away it is a vertical line; on the wall it is the section of the wall by the half plane of the
 vertex' azimuth. So vertices cannot move along the surface, which would not change the energy, and
-wetted areas are integrals along rails. After each minimisation the vertices are averaged within the
+wetted areas are integrals along rails. After each minimisation vertices are averaged within the
 surface and get new rails. Gradient and Hessian are exact; the minimum is found by the trust-region
 Newton-CG method of SciPy.
 """

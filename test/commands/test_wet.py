@@ -104,7 +104,7 @@ def test_least_energy_between_many_pads_and_off_the_origin(
 def test_least_energy_without_an_answer(capsys: pytest.CaptureFixture[str]):
     low = ['wet', 'cylinder', '--radius', '1e-3', '--height', '1e-3', '--angle', '0']
     assert cli.main([*low, '--method', 'energy']) == 1
-    assert 'status rim: the liquid reaches the end' in capsys.readouterr().err
+    assert 'status rim: the liquid reaches the top' in capsys.readouterr().err
     assert cli.main([*DOME, '--method', 'energy', '--area', '7e-6']) == 2
     assert 'area = 7e-06' in capsys.readouterr().err
     assert cli.main([*DOME, '--method', 'energy', '--layers', '50']) == 2
