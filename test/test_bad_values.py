@@ -16,8 +16,6 @@ from ros_pad.trials.sweep import Sweep
 
 FOOT = contact.Foot.load('large19')
 ROBOT = robots.Robot.load('go2')
-FACE = capillary.Face.floor(1e-3)
-CENTRE = [0.0, 1.0, 2.0]
 FLOOR = simulation.Floor.uniform(True, 1e-4)
 HEXAPOD = simulation.Scene.load('hexapod_patches')
 RAIL_LEG = simulation.Scene.load('leg_wet_flat')
@@ -43,8 +41,8 @@ CASES = (
     (contact.pressure_for, ('large', 0.1), 'pad'),
     (capillary.bath_meniscus, (), {'liquid': WATER, 'wall': 1e-3}),
     (capillary.press_wet, ('large', 75e3, 0.1, WATER), 'pad'),
-    (capillary.bath_surface, ('dome', WATER), 'face'),
-    (capillary.bath_surface, (FACE, WATER, 9.81, 24.5), 'sectors'),
+    (capillary.wet_surface, (capillary.Wall.dome(2e-3, 1e-3), 'water'), 'liquid'),
+    (capillary.Wall.through, ([1e-3, 2e-3], [0.0, 'top']), 'heights'),
     (robots.Gait.named, ('tripod', [0.1, 0.2], 1.0, 0.6, 0.03), 'hips'),
     (ROBOT.gravity_torques, (ROBOT.home, -9.81), 'gravity'),
     (ROBOT.joint_positions, ([0.1, 0.0, -0.3],), 'feet'),

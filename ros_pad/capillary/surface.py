@@ -1,380 +1,731 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Liquid surfaces of any shape: minimum energy of a triangulated surface between solid faces.
+"""Surfaces of least energy around a pad of any shape, alone in a wide bath or one of many.
 
-The energy is that of the free surface, the weight and the wetted faces: ``γ A + ρ g ∫ z dV - γ cos
-θ A_wet`` for each face, minus ``p V`` where the pressure p at z = 0 is given. Volume and weight
-are integrals of z and z²/2 over the projected boundary. Vertical walls and the floor at z = 0 do
-not contribute, and no tetrahedra are needed.
+The liquid is connected to a bath at floor level, z = 0, where it has the pressure of the air. The
+energy is that of the free surface, the weight and the wetted wall: ``γ A + ρ g ∫ z dV - γ cos θ
+A_wet``. Volume and weight are integrals of z and z²/2 over the projected boundary, so that no
+tetrahedra are needed.
 
-Each vertex moves on a rail, so it has one unknown. Inside the surface the rail is the normal; on a
-solid face it is the intersection of the face with the half plane of the vertex' azimuth. So
-vertices cannot move along the surface, which would not change the energy, and wetted areas are
-integrals along rails. After each minimisation the vertices are averaged within the surface and get
-new rails.
-
-Gradient and Hessian are exact. The minimum is found by the trust-region Newton-CG method of SciPy.
-An augmented Lagrangian keeps the volume; its multiplier is the pressure.
+The surface is a mesh of triangles between a ring on the wall of the pad and a ring far from it.
+Each vertex moves on a rail, so it has one unknown. Inside the surface the rail is the normal; far
+away it is a vertical line; on the wall it is the section of the wall by the half plane of the
+vertex' azimuth. So vertices cannot move along the surface, which would not change the energy, and
+wetted areas are integrals along rails. After each minimisation vertices are averaged within the
+surface and get new rails. Gradient and Hessian are exact; the minimum is found by the trust-region
+Newton-CG method of SciPy.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ros_pad.capillary.faces import Integers, boundary_edges
-from ros_pad.capillary.rails import Line, Rails, edges_of, normals_of
-from ros_pad.configuration import integer, number
+from ros_pad.capillary.bath import Wall, bath_meniscus
+from ros_pad.capillary.layers import WETTING
+from ros_pad.capillary.mesh import Indices, Mesh
+from ros_pad.capillary.sections import centre
+from ros_pad.configuration import instance, integer, number
+from ros_pad.contact.meniscus import GRAVITY, Liquid, hysteresis_force
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput, NoSurface
+from ros_pad.errors import InvalidInput, MeshError, NoSurface
+
+KNOTS = 129  # number of points of a rail
+REACH = 8.0  # capillary lengths from a pad to where a bath ends, with an error of exp(-2 REACH)
+THINNEST = 0.01  # quality of a triangle (1: equilateral) below which the surface has pinched off
+
+# Radii and heights of a wall, (azimuths, KNOTS, 2), from the floor up at equal steps.
+Rails: TypeAlias = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
-class LiquidSurface:
-    """A liquid surface in equilibrium.
+class WetSurface:
+    """Liquid of least energy around a pad, alone in a bath or one of many.
 
     Attributes
     ----------
     vertices : array, shape (n, 3)
-        Positions, m.
+        Positions on the surface, m.
     triangles : array of int, shape (m, 3)
-        Corners, anticlockwise as seen from the gas.
-    lines : tuple of Line
-        Lines along which the surface ends on solid faces.
+        Corners, anticlockwise as seen from the air.
+    line : array, shape (k, 3)
+        Points of the contact line on the pad, in order of azimuth, m.
+    axis : tuple of float
+        x and y of the axis of the pad, m.
     area : float
-        Area between liquid and gas, m².
+        Area between liquid and air, m².
     energy : float
-        Energy of surface, weight and wetting, J, with smooth lines: it converges faster than area
-        and volume, whose lines have corners.
+        Energy of surface, weight and wetting, J, with a smooth contact line: it converges faster
+        than area and volume, whose line has corners.
     volume : float
-        Volume of the liquid, m³.
-    pressure : float
-        Pressure of the liquid minus that of the gas at z = 0, Pa.
-    forces : array, shape (lines, 3)
-        Force of the liquid on each face, N, z up.
-    residual : float
-        Largest energy decrease still possible by moving one vertex, relative to the energy of the
-        surface.
-    change : float
-        Relative change of the area by the last averaging of vertices.
-    history : tuple of float
-        Area after each refinement, m²; the differences show the error.
+        Volume of the liquid above the floor, m³.
+    force : array, shape (3,)
+        Force of the liquid on the pad, N, z up.
+    error : float
+        Estimated relative error of the mean height: its change by the last halving of the
+        triangles, twice that below 10 degrees of contact angle, where convergence is slower. NaN
+        without refinements.
+    liquid : Liquid
+        The liquid.
     """
 
     vertices: Array
-    triangles: Integers
-    lines: tuple[Line, ...]
+    triangles: Indices
+    line: Array
+    axis: tuple[float, float]
     area: float
     energy: float
     volume: float
-    pressure: float
-    forces: Array
-    residual: float
-    change: float
-    history: tuple[float, ...]
+    force: Array
+    error: float
+    liquid: Liquid
+
+    @property
+    def mean_height(self) -> float:
+        """Mean height of the contact line, m."""
+        return float(self.line[:, 2].mean())
+
+    def hysteresis_force(self, direction: float, advancing: float, receding: float) -> float:
+        """Return the largest force of the pinned contact line against a motion.
+
+        Parameters
+        ----------
+        direction : float
+            Azimuth of the motion, rad from the x axis.
+        advancing, receding : float
+            Contact angles at which the line starts to move, rad, from 0 to pi; advancing >=
+            receding.
+
+        Returns
+        -------
+        float
+            Force, N, as :meth:`ros_pad.capillary.Wet.hysteresis_force`.
+
+        Raises
+        ------
+        InvalidInput
+            When an angle is not finite or out of range.
+        """
+        azimuth = number('direction', direction, 'rad', low=-math.inf)
+        width = np.ptp(self.line[:, 1] * math.cos(azimuth) - self.line[:, 0] * math.sin(azimuth))
+        tension = self.liquid.surface_tension
+        return float(hysteresis_force(0.5 * float(width), tension, advancing, receding))
 
 
-def minimise(
-    vertices: Array,
-    triangles: Integers,
-    lines: Sequence[Line],
-    surface_tension: float,
-    weight: float = 0.0,
-    pressure: float | None = None,
-    volume: float | None = None,
-    refinements: int = 0,
-) -> LiquidSurface:
-    """Compute the surface of minimum energy near a given one.
+def wet_surface(
+    pad: Mesh | Wall,
+    liquid: Liquid,
+    area: float | None = None,
+    sectors: int = 24,
+    refinements: int = 1,
+    square: bool = False,
+) -> WetSurface:
+    """Compute the liquid of least energy around a pad, with its error.
 
     Parameters
     ----------
-    vertices : array, shape (n, 3)
-        Start positions, m, z up. Vertices on lines are moved to their lines.
-    triangles : array of int, shape (m, 3)
-        Corners, anticlockwise as seen from the gas.
-    lines : sequence of Line
-        Lines that contain all boundary edges of the surface.
-    surface_tension : float
-        Surface tension, N/m, above 0.
-    weight : float
-        Density times gravity, N/m³, from 0.
-    pressure, volume : float, optional
-        Pressure of the liquid minus that of the gas at z = 0, Pa, or volume of the liquid, m³,
-        above 0. Exactly one of them is required.
+    pad : Mesh or Wall
+        A single pad; each horizontal section is star-shaped as seen from the centroid of the
+        lowest one.
+    liquid : Liquid
+        Its contact angle on the pad is ``liquid.angle``.
+    area : float, optional
+        Area of one pad of a pattern with the gap around it, m², above 0. Without it the pad stands
+        alone in a wide bath at floor level.
+    sectors : int
+        Number of vertices around the pad before refinement, from 6; of a pattern a multiple of
+        12, of a square one of 8.
     refinements : int
-        How often each triangle is split into four and the surface minimised again, from 0.
+        Number of refinements, from 0; each halves the size of the triangles.
+    square : bool
+        The pattern is square instead of hexagonal.
 
     Returns
     -------
-    LiquidSurface
-        Positions, m, area, m², energy, J, volume, m³, pressure, Pa, and force on each face, N.
+    WetSurface
+        The surface and its contact line, m, volume, m³, force, N, and estimated error.
 
     Raises
     ------
     NoSurface
-        ``collapsed`` where the surface pinches off or turns over, or a contact line reaches an end
-        of its face; ``no_convergence`` where the minimisation does not converge.
+        ``rim`` where the liquid is pushed below the floor or reaches the top of the wall;
+        ``collapsed`` where the surface pinches off or turns over; ``no_convergence`` where the
+        minimisation does not converge; or as :func:`bath_meniscus` does.
+    MeshError
+        When the wall of a mesh is not star-shaped, has ledges or fewer than 12 vertices.
     InvalidInput
-        When a value or shape is not allowed, both or none of pressure and volume are given, or a
-        boundary edge is on no line.
+        When a value is out of range or of the wrong type, or pads on this area touch.
+
+    Notes
+    -----
+    The radii of a mesh are fitted over azimuth and height by moving least squares with quadratics,
+    because contact angles need smooth slopes: edges are rounded over about two triangles.
+
+    Examples
+    --------
+    The exact meniscus of this dome in a wide bath is 0.889 mm high (:func:`bath_meniscus`):
+
+    >>> from ros_pad.capillary import Mesh, wet_surface
+    >>> from ros_pad.contact import WATER
+    >>> found = wet_surface(Mesh.dome(1.55e-3, 0.583e-3), WATER)
+    >>> round(1e3 * found.mean_height, 2), found.error < 0.01
+    (0.89, True)
     """
-    tension = number('surface_tension', surface_tension, 'N/m', above=True)
-    heavy = number('weight', weight, 'N/m³')
-    if (pressure is None) == (volume is None):
-        raise InvalidInput(
-            'exactly one of pressure and volume is needed, but'
-            f' {"none" if volume is None else "both"} is given'
-        )
-    push = 0.0 if pressure is None else number('pressure', pressure, 'Pa', low=-math.inf)
+    instance('liquid', liquid, Liquid)
+    integer('sectors', sectors, 6)
     integer('refinements', refinements)
-    points, corners = np.array(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
-    _check_surface(points, corners, lines)
-    size = float(np.ptp(points[np.unique(corners)], axis=0).max())
-    system = System(
-        tension=tension,
-        weight=heavy * size**2 / tension,
-        size=size,
-        volume=None if volume is None else number('volume', volume, 'm³', above=True),
-        points=points / size,
-        triangles=corners,
-        lines=tuple(lines),
-        multiplier=push * size / tension,
+    axis, rails = _on_wall(pad) if isinstance(pad, Wall) else _on_mesh(pad)
+    curves = rails(_turns(sectors))
+    if area is None:
+        surface, outer = _in_bath(curves, liquid)
+    else:
+        surface, outer = _in_cell(curves, liquid, area, square)
+    size = float(np.ptp(surface.points, axis=0).max())
+    task = _Task(
+        rails=lambda azimuths: rails(azimuths) / size,
+        outer=lambda azimuths: outer(azimuths) / size,
+        cosine=math.cos(liquid.angle),
+        weight=liquid.density * GRAVITY * size**2 / liquid.surface_tension,
     )
-    history = []
+    surface = replace(surface, points=surface.points / size)
+    heights = []
     for level in range(refinements + 1):
         if level:
-            system = system.refined()
-        system = system.relaxed()
-        before = system.area()
-        system = system.averaged().relaxed()
-        history.append(system.area() * size**2)
-    return system.result(system.area() / before - 1.0, history)
-
-
-def _check_surface(points: Array, corners: Integers, lines: Sequence[Line]) -> None:
-    """Raise `InvalidInput` for vertices or triangles of wrong shape, or edges on no line."""
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise InvalidInput(
-            f'vertices of shape {points.shape} are not allowed: finite numbers of shape (n, 3), m,'
-            ' are needed'
-        )
-    if corners.ndim != 2 or corners.shape[1] != 3 or not np.all(corners < len(points)):
-        raise InvalidInput(
-            f'triangles of shape {corners.shape} are not allowed: indices of the {len(points)}'
-            ' vertices, shape (m, 3), are needed'
-        )
-    if not lines:
-        raise InvalidInput('lines = () is not allowed: at least one line is needed')
-    loose = np.setdiff1d(
-        boundary_edges(corners), np.concatenate([line.vertices for line in lines])
+            surface = _refined(task, surface)
+        surface = _relaxed(task, _averaged(_relaxed(task, surface)))
+        heights.append(surface.points[surface.ring, 2].mean())
+    error = abs(1.0 - heights[-2] / heights[-1]) if refinements else math.nan
+    result = _Energy(task, surface)
+    energy = result.value(result.start)[0]
+    # Rings are polygons, and the energy is often a small difference: their error is estimated
+    # with twice as many corners. It falls with the square of the number.
+    finer = _Energy(task, _refined(task, surface))
+    energy += 4.0 / 3.0 * (finer.value(finer.start)[0] - energy)
+    unit = liquid.surface_tension * size
+    vertices = surface.points * size + (*axis, 0.0)
+    return WetSurface(
+        vertices=vertices,
+        triangles=surface.triangles,
+        line=vertices[surface.ring],
+        axis=axis,
+        area=0.5 * float(np.linalg.norm(_across(surface), axis=1).sum()) * size**2,
+        energy=float(energy) * unit * size,
+        volume=result.volume() * size**3,
+        force=result.force(surface) * unit,
+        error=float(error) * (2.0 if liquid.angle < WETTING else 1.0),
+        liquid=liquid,
     )
-    if loose.size:
-        raise InvalidInput(
-            f'vertex {loose[0]} is at an edge of the surface, but on no line: every edge of the'
-            ' surface must be on a line'
+
+
+# --- Walls of pads -----------------------------------------------------------------------------
+
+
+def _turns(count: int) -> Array:
+    return np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+
+
+def _on_wall(wall: Wall) -> tuple[tuple[float, float], Rails]:
+    from scipy.interpolate import Akima1DInterpolator
+
+    if not math.isfinite(wall.top):
+        raise InvalidInput('wall.top = inf is not allowed: a wall of finite height is needed')
+    places = np.linspace(wall.floor, wall.top, KNOTS)
+    curve = np.array([wall.meridian(float(place))[:2] for place in places])
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(curve, axis=0).T)))
+    rail = Akima1DInterpolator(along, curve)(np.linspace(0.0, along[-1], KNOTS))
+    return (0.0, 0.0), lambda azimuths: np.broadcast_to(rail, (azimuths.size, KNOTS, 2))
+
+
+def _on_mesh(mesh: Mesh) -> tuple[tuple[float, float], Rails]:
+    instance('mesh', mesh, Mesh)
+    axis = centre(mesh, 0.005 * mesh.height)
+    points = mesh.points - (*axis, 0.0)
+    size = float(np.ptp(points, axis=0).max())
+    azimuth, z = np.arctan2(points[:, 1], points[:, 0]), points[:, 2]
+    upright = np.ptp(z[mesh.faces], axis=1) > 1e-9 * size
+    walls = mesh.faces[upright]
+    turn = azimuth[walls] - azimuth[walls[:, :1]]
+    turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
+    rise = z[walls] - z[walls[:, :1]]
+    area = turn[:, 1] * rise[:, 2] - turn[:, 2] * rise[:, 1]  # over azimuth and height
+    low, high = float(z[walls].min()), float(z[walls].max())
+    once = abs(area.sum() - 4.0 * math.pi * (high - low)) < 1e-6 * size and (area > 0.0).all()
+    level = z[mesh.faces[~upright]]
+    use = np.unique(walls)
+    if not once or np.minimum(level - low, high - level).max() > 1e-6 * size or use.size < 12:
+        raise MeshError(
+            f'{mesh.source}: the wall leans over itself, has ledges or fewer than 12 vertices, or'
+            f' does not surround the vertical line through {axis[0]:g}, {axis[1]:g} m exactly once'
         )
+    radii = np.hypot(*points[use, :2].T)
+    # Scale heights so that rows and columns of vertices are equally far apart.
+    scale = float(np.mean(abs(rise)) / np.mean(abs(turn)))
+    chart = np.column_stack([azimuth[use], z[use] / scale])
+    turns = np.concatenate([chart + np.array([2.0 * math.pi * k, 0.0]) for k in (-1, 0, 1)])
+
+    def rails(azimuths: Array) -> Array:
+        at = np.mod(azimuths + math.pi, 2.0 * math.pi) - math.pi
+        heights = np.broadcast_to(np.linspace(low, high, KNOTS), (at.size, KNOTS))
+        places = np.stack(np.broadcast_arrays(at[:, None], heights / scale), axis=-1)
+        found = _fitted(turns, np.tile(radii, 3), places.reshape(-1, 2))
+        return np.stack([found.reshape(heights.shape), heights], axis=-1)
+
+    return axis, rails
+
+
+def _fitted(places: Array, values: Array, at: Array) -> Array:
+    """Return values at other places (``at``), by quadratics fitted to the nearest 32 values."""
+    from scipy.spatial import cKDTree
+
+    distance, near = cKDTree(places).query(at, k=32)
+    reach = distance[:, -1:]
+    x, y = np.moveaxis((places[near] - at[:, None]) / reach[..., None], -1, 0)
+    weight = (1.0 - np.minimum(distance / reach, 1.0) ** 2) ** 2 + 1e-12
+    basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
+    weighted = (basis * weight[..., None]).swapaxes(1, 2)
+    # Regularisation: where all neighbours lie in two rows, choose the flattest quadratic.
+    squares = weighted @ basis + 1e-6 * np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+    fit: Array = np.linalg.solve(squares, weighted @ values[near][..., None])[:, 0, 0]
+    return fit
+
+
+# --- Surfaces to begin with --------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class System:
-    """A surface during minimisation.
+class _Surface:
+    """A surface between a ring on the pad and one far from it, both in equal steps of azimuth.
 
-    Attributes
-    ----------
-    tension, size : float
-        Units: surface tension, N/m, and extent of the surface, m. The other lengths are divided by
-        ``size`` and energies by ``tension size²``.
-    weight : float
-        Density gravity size² / tension.
-    volume : float or None
-        Given volume, m³.
-    points, triangles, lines
-        The surface.
-    multiplier : float
-        Pressure of the liquid minus that of the gas at z = 0, over tension / size.
-    residual : float
-        As for `LiquidSurface`.
+    ``ring`` and ``far`` are the numbers of their vertices; ``places`` are those of the ring on its
+    rails, from 0 to 1.
     """
 
-    tension: float
-    weight: float
-    size: float
-    volume: float | None
     points: Array
-    triangles: Integers
-    lines: tuple[Line, ...]
-    multiplier: float
-    residual: float = math.nan
+    triangles: Indices
+    ring: Indices
+    far: Indices
+    places: Array
 
-    def area(self) -> float:
-        """Return the area of the surface."""
-        corners = self.points[self.triangles]
-        sides = corners[:, 1:] - corners[:, :1]
-        return 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1).sum())
 
-    @np.errstate(over='ignore', invalid='ignore')
-    def relaxed(self) -> System:
-        """Return the surface of minimum energy on the present rails."""
-        from scipy.optimize import minimize
+def _spanned(grid: Array, place: float) -> _Surface:
+    """Return the surface through rows of vertices, from pad to far, shape (rows, sectors, 3)."""
+    rows, sectors = grid.shape[0] - 1, grid.shape[1]
+    i, j = np.divmod(np.arange(rows * sectors), sectors)
+    a, b = i * sectors + j, i * sectors + (j + 1) % sectors
+    c, d = a + sectors, b + sectors
+    flip = (i + j) % 2 == 0  # alternating diagonals prefer no direction
+    one = np.where(flip, [a, c, d], [a, c, b]).T
+    two = np.where(flip, [a, d, b], [b, c, d]).T
+    ring = np.arange(sectors)
+    triangles = np.concatenate([one, two])
+    places = np.full(sectors, place)
+    return _Surface(grid.reshape(-1, 3), triangles, ring, rows * sectors + ring, places)
 
-        rails = Rails(self)
-        target = None if self.volume is None else self.volume / self.size**3
-        goal = _Goal(rails, self.multiplier, target)
-        for _ in range(40):
-            try:
-                found = minimize(
-                    goal.value,
-                    goal.y,
-                    jac=True,
-                    hessp=goal.product,
-                    method='trust-ncg',
-                    options={'gtol': 1e-8, 'maxiter': 300, 'initial_trust_radius': 0.1},
-                )
-            except ValueError as error:  # triangles without area have no finite Hessian
-                raise NoSurface(
-                    f'the surface collapses: a triangle has lost its area ({error})', 'collapsed'
-                ) from error
-            rails.check(goal.scale * found.x)
-            goal.y = found.x
-            if goal.improve() < 1e-9:
-                break
-        residual, miss = float(np.max(abs(found.jac))) ** 2, goal.miss
-        if miss > 1e-6 or residual > 1e-12:
-            raise NoSurface(
-                f'the minimisation does not converge: residual = {residual:.2g} of the energy (at'
-                f' most 1e-12 is needed), relative volume error = {miss:.2g} (at most 1e-6)',
-                'no_convergence',
-            )
-        q = goal.scale * goal.y
-        points, places = rails.positions(q)
-        lines = tuple(
-            replace(line, places=place) for line, place in zip(self.lines, places, strict=True)
+
+def _ring(radii: Array, height: float | Array) -> Array:
+    """Return points at equal steps of azimuth, shape (n, 3)."""
+    azimuths = _turns(radii.size)
+    x, y = radii * np.cos(azimuths), radii * np.sin(azimuths)
+    return np.column_stack([x, y, np.broadcast_to(height, radii.shape)])
+
+
+def _in_bath(curves: Array, liquid: Liquid) -> tuple[_Surface, Rails]:
+    """Return the exact meniscus of the axisymmetric pad with the same mean radii."""
+    mean, sectors = curves.mean(axis=0), len(curves)
+    wall = replace(Wall.through(*mean.T), steps=12)  # coarse: only a start is needed
+    bath = bath_meniscus(wall=wall, liquid=liquid)
+    if bath.status in ('dry', 'rim'):
+        raise NoSurface(
+            'the liquid is pushed below the floor, where the wall ends'
+            if bath.status == 'dry'
+            else f'the liquid reaches the top of the wall at height = {bath.height:g} m: a taller'
+            ' pad is needed',
+            'rim',
         )
-        return replace(
-            self, points=points, lines=lines, multiplier=goal.multiplier, residual=residual
+    place = float(np.interp(bath.height, mean[:, 1], np.linspace(0.0, 1.0, KNOTS)))
+    length = math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
+    far = float(curves[..., 0].max()) + REACH * length
+    # Triangles are as long as wide, or shorter where the surface is curved, and grow outwards.
+    step = 2.0 * math.pi / sectors
+    first = step * min(bath.radius, length)
+    rows = math.ceil(math.log1p(step * REACH * length / first) / math.log1p(step))
+    radii, heights = curves[:, round(place * (KNOTS - 1))].T
+    inner, outer = _ring(radii, heights), _ring(np.full(sectors, far), 0.0)
+    share = np.append(0.0, np.cumsum((1.0 + step) ** np.arange(rows)))
+    grid = inner + (share / share[-1])[:, None, None] * (outer - inner)
+    # Bend the straight surface.
+    distance = np.linalg.norm(grid - inner.mean(axis=0), axis=2)
+    distance = (distance - distance[0]).mean(axis=1)
+    along = np.append(0.0, np.cumsum(np.hypot(np.diff(bath.radii), np.diff(bath.heights))))
+    beyond = np.interp(distance, along, bath.radii) - bath.radius
+    level = np.interp(distance, along, bath.heights)
+    bent = [_ring(radii + beyond[k], level[k]) for k in range(rows)]
+    return _spanned(np.stack([*bent, outer]), place), lambda azimuths: np.full(azimuths.size, far)
+
+
+def _in_cell(curves: Array, liquid: Liquid, area: float, square: bool) -> tuple[_Surface, Rails]:
+    """Return a cone from the pad to the middle between equal pads."""
+    sides, ratio = (4, 1.0) if square else (6, math.sqrt(0.75))
+    pitch = math.sqrt(number('area', area, 'm²', above=True) / ratio)
+    sectors = len(curves)
+    if sectors % (2 * sides):
+        raise InvalidInput(
+            f'sectors = {sectors!r} is not allowed: a multiple of {2 * sides} is needed, for'
+            ' vertices in the corners of the cell'
         )
-
-    def averaged(self) -> System:
-        """Return the surface with inner vertices moved along it, towards their neighbours."""
-        points, edges = self.points, edges_of(self.triangles)
-        total, count = np.zeros_like(points), np.zeros(len(points))
-        for a, b in (edges.T, edges.T[::-1]):
-            np.add.at(total, a, points[b])
-            np.add.at(count, a, 1.0)
-        shift = total / np.maximum(count, 1.0)[:, None] - points
-        normals = normals_of(points, self.triangles)
-        shift -= normals * np.sum(shift * normals, axis=1, keepdims=True)
-        shift[np.concatenate([line.vertices for line in self.lines])] = 0.0
-        return replace(self, points=points + 0.3 * shift)
-
-    def refined(self) -> System:
-        """Return the surface with each triangle split into four."""
-        edges = edges_of(self.triangles)
-        first = len(self.points)
-        index = {frozenset((int(a), int(b))): first + k for k, (a, b) in enumerate(edges)}
-        points = np.vstack([self.points, self.points[edges].mean(axis=1)])
-        middles = np.array(
-            [
-                [index[frozenset((int(t[k]), int(t[k - 2])))] for k in range(3)]
-                for t in self.triangles
-            ]
-        )  # middle k is between corners k and k + 1
-        (a, b, c), (ab, bc, ca) = self.triangles.T, middles.T
-        triangles = np.concatenate(
-            [
-                np.stack(new, axis=1)
-                for new in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-            ]
+    widest = 2.0 * float(curves[..., 0].max())
+    if widest >= pitch:
+        raise InvalidInput(
+            f'area = {area:g} m² is not allowed: above {ratio * widest**2:g} m² is needed, for a'
+            f' pitch above {widest:g} m, the width of the pads'
         )
-        rim = {(int(x), int(y)) for x, y in boundary_edges(self.triangles)}
-        lines = []
-        for line in self.lines:
-            at = {int(v): k for k, v in enumerate(line.vertices)}
-            pairs = [(x, y) for x, y in rim if x in at and y in at]
-            i, j = (np.array([at[pair[end]] for pair in pairs]) for end in (0, 1))
-            gap = np.mod(line.azimuths[j] - line.azimuths[i] + math.pi, 2 * math.pi) - math.pi
-            new = np.array([index[frozenset(pair)] for pair in pairs], dtype=np.int64)
-            lines.append(
-                replace(
-                    line,
-                    vertices=np.append(line.vertices, new),
-                    azimuths=np.append(line.azimuths, line.azimuths[i] + 0.5 * gap),
-                    places=np.append(line.places, 0.5 * (line.places[i] + line.places[j])),
-                )
-            )
-        return replace(self, points=points, triangles=triangles, lines=tuple(lines))
+    turn = 2.0 * math.pi / sides
 
-    def result(self, change: float, history: list[float]) -> LiquidSurface:
-        """Return the surface in SI units, with the forces on its faces."""
-        rails = Rails(self)
-        energy, volume, _, _ = rails.energy(rails.start)
-        # Lines are polygons, and the energy is often a small difference: their error is estimated
-        # with twice as many corners. It falls with the square of the number.
-        finer = Rails(self.refined())
-        more, filled, _, _ = finer.energy(finer.start)
-        energy += 4.0 / 3.0 * (more - energy - self.multiplier * (filled - volume))
-        unit = self.tension * self.size
-        return LiquidSurface(
-            self.points * self.size,
-            self.triangles,
-            self.lines,
-            self.area() * self.size**2,
-            energy * unit * self.size,
-            volume * self.size**3,
-            self.multiplier * self.tension / self.size,
-            unit * rails.forces(self.multiplier),
-            self.residual,
-            change,
-            tuple(history),
-        )
+    def outer(azimuths: Array) -> Array:
+        off = np.mod(azimuths + 0.5 * turn, turn) - 0.5 * turn
+        return 0.5 * pitch / np.cos(off)
+
+    mean = curves.mean(axis=0)
+    place = _film_place(mean, liquid)
+    radius, level = mean[round(place * (KNOTS - 1))]
+    middle = 0.55 * pitch
+    rows = max(2, round((middle - radius) / (middle + radius) * sectors / math.pi))
+    inner = _ring(*curves[:, round(place * (KNOTS - 1))].T)
+    far = _ring(outer(_turns(sectors)), level)
+    share = np.linspace(0.0, 1.0, rows + 1)[:, None, None]
+    return _spanned(inner + share * (far - inner), place), outer
 
 
-class _Goal:
-    """Function to be minimised: the energy, with an augmented Lagrangian for a given volume.
+def _film_place(mean: Array, liquid: Liquid) -> float:
+    """Return an estimate of the contact line's place on the rail in a pattern, from 0 to 1.
 
-    The unknowns ``y`` are the places on the rails, scaled so that the Hessian's diagonal is 1.
+    This is the mean height of the level film between close pads and the meniscus of a single pad:
+    that of small slopes, with the height of steep ones for wide pads.
+    """
+    from scipy.special import k0e, k1e
+
+    radii, heights = mean.T
+    lean = np.arctan2(np.gradient(heights), np.gradient(radii))
+    level = float(np.interp(math.pi - liquid.angle, np.maximum.accumulate(lean), heights))
+    length = math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
+    slopes = np.maximum(math.pi - liquid.angle - lean, 0.0)
+    distance = np.maximum(radii / length, 1e-9)
+    met = 2.0 * length * np.sin(0.5 * slopes) * k0e(distance) / k1e(distance) <= heights
+    level = 0.5 * (level + float(heights[np.argmax(met)] if met.any() else heights[-1]))
+    return float(np.clip(np.interp(level, heights, np.linspace(0.0, 1.0, KNOTS)), 0.02, 0.98))
+
+
+# --- Minimisation ------------------------------------------------------------------------------
+
+
+class _Task(NamedTuple):
+    """What a surface is between, with lengths over its extent and energies over the tension.
+
+    ``rails`` gives the wall, ``outer`` the radii of the far ring, by azimuth; ``cosine`` is that
+    of the contact angle.
     """
 
-    def __init__(self, rails: Rails, multiplier: float, target: float | None) -> None:
-        self.rails, self.multiplier, self.target = rails, multiplier, target
-        self.stiffness = 0.0 if target is None else 30.0 * rails.area / target**2
-        self.miss = 0.0
-        diagonal = abs(rails.matrix(rails.start, multiplier).diagonal())
-        self.scale = 1.0 / np.sqrt(np.maximum(diagonal, 1e-6 * diagonal.max()))
-        # Random shifts make the search leave unstable equilibria, such as a long cylinder.
-        push = np.random.default_rng(0).normal(size=rails.start.size)
-        self.y = (rails.start + 1e-2 * rails.shortest * push) / self.scale
-        self._at: Array | None = None
+    rails: Rails
+    outer: Rails
+    cosine: float
+    weight: float
 
-    def _over(self, volume: float) -> float:
-        return 0.0 if self.target is None else volume - self.target
 
-    def value(self, y: Array) -> tuple[float, Array]:
-        """Return the function to be minimised and its gradient."""
-        energy, volume, slope, volume_slope = self.rails.energy(self.scale * y)
-        over = self._over(volume)
-        value = energy - self.multiplier * volume + 0.5 * self.stiffness * over**2
-        push = self.multiplier - self.stiffness * over
-        return value, self.scale * (slope - push * volume_slope)
+@np.errstate(over='ignore', invalid='ignore')
+def _relaxed(task: _Task, surface: _Surface) -> _Surface:
+    """Return the surface of least energy on the present rails."""
+    from scipy.optimize import minimize
 
-    def product(self, y: Array, direction: Array) -> Array:
-        """Return the Hessian times a direction; the Hessian is kept while y stays the same."""
-        if self._at is None or not np.array_equal(self._at, y):
-            q = self.scale * y
-            _, volume, _, self._volume_slope = self.rails.energy(q)
-            push = self.multiplier - self.stiffness * self._over(volume)
-            self._matrix, self._at = self.rails.matrix(q, push), y.copy()
-        step = self.scale * direction
-        across = self.stiffness * (self._volume_slope @ step)
-        result: Array = self.scale * (self._matrix @ step + across * self._volume_slope)
-        return result
+    energy = _Energy(task, surface)
+    diagonal = abs(energy.matrix(energy.start).diagonal())
+    scale = 1.0 / np.sqrt(np.maximum(diagonal, 1e-6 * diagonal.max()))
+    kept: dict[str, Any] = {}
 
-    def improve(self) -> float:
-        """Update the multiplier; return the relative error of the volume."""
-        over = self._over(self.rails.energy(self.scale * self.y)[1])
-        self.multiplier -= self.stiffness * over
-        self._at = None
-        self.miss = abs(over / self.target) if self.target else 0.0
-        return self.miss
+    def value(y: Array) -> tuple[float, Array]:
+        found, slope = energy.value(scale * y)
+        return found, scale * slope
+
+    def product(y: Array, direction: Array) -> Array:
+        if not kept or not np.array_equal(kept['y'], y):
+            kept.update(y=y.copy(), matrix=energy.matrix(scale * y))
+        across: Array = scale * (kept['matrix'] @ (scale * direction))
+        return across
+
+    options = {'gtol': 1e-8, 'maxiter': 300, 'initial_trust_radius': 0.1}
+    try:
+        found = minimize(value, energy.start / scale, jac=True, hessp=product, method='trust-ncg',
+                         options=options)  # fmt: skip
+    except ValueError as error:  # triangles without area have no finite Hessian
+        raise NoSurface(f'the surface collapses: {error}', 'collapsed') from error
+    moved = energy.moved(surface, scale * found.x)
+    residual = float(np.max(abs(found.jac))) ** 2
+    if residual > 1e-12:
+        raise NoSurface(
+            f'the minimisation does not converge: residual = {residual:.2g} of the energy (at most'
+            ' 1e-12 is needed)',
+            'no_convergence',
+        )
+    return moved
+
+
+def _averaged(surface: _Surface) -> _Surface:
+    """Return the surface with inner vertices moved along it, towards their neighbours."""
+    points, near, normals = surface.points, _near(surface), _normals(surface)
+    shift = near @ points / near.sum(axis=1).reshape(-1, 1) - points
+    shift -= normals * np.sum(shift * normals, axis=1, keepdims=True)
+    shift[surface.ring] = shift[surface.far] = 0.0
+    return replace(surface, points=points + 0.3 * shift)
+
+
+def _refined(task: _Task, surface: _Surface) -> _Surface:
+    """Return the surface with each triangle split into four."""
+    first, edges = len(surface.points), _edges(surface.triangles)
+    keys = edges @ (first, 1)
+
+    def middle(a: Indices, b: Indices) -> Indices:
+        found: Indices = first + np.searchsorted(keys, np.minimum(a, b) * first + np.maximum(a, b))
+        return found
+
+    points = np.vstack([surface.points, surface.points[edges].mean(axis=1)])
+    a, b, c = surface.triangles.T
+    ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+    split = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    triangles = np.concatenate([np.stack(corners, axis=1) for corners in split])
+    ring, far = (
+        np.column_stack([each, middle(each, np.roll(each, -1))]).ravel()
+        for each in (surface.ring, surface.far)
+    )
+    places = surface.places
+    places = np.column_stack([places, 0.5 * (places + np.roll(places, -1))]).ravel()
+    points[far] = _ring(task.outer(_turns(far.size)), points[far, 2])
+    return _Surface(points, triangles, ring, far, places)
+
+
+class _Energy:
+    """Energy of a surface as a function of the places of its vertices on rails, with derivatives.
+
+    The unknowns ``q`` are distances along rails: on the wall from the floor, elsewhere from the
+    start. ``start`` has the values of the given surface.
+    """
+
+    def __init__(self, task: _Task, surface: _Surface) -> None:
+        self.weight, self.cosine = task.weight, task.cosine
+        self.triangles, self.ring = surface.triangles, surface.ring
+        self.wall = _WallRails(task.rails(_turns(self.ring.size)))
+        self.base, self.direction = surface.points, _normals(surface)
+        self.direction[surface.far] = (0.0, 0.0, 1.0)
+        self.start = np.zeros(len(self.base))
+        self.start[self.ring] = surface.places * self.wall.length
+
+    def place(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return positions of the vertices, and first and second derivatives along the rails."""
+        x = self.base + q[:, None] * self.direction
+        d, dd = self.direction.copy(), np.zeros_like(x)
+        x[self.ring], d[self.ring], dd[self.ring] = self.wall.place(q[self.ring])
+        return x, d, dd
+
+    def moved(self, surface: _Surface, q: Array) -> _Surface:
+        """Return the surface at other places; refuse one that has pinched off or left the wall."""
+        places = q[self.ring] / self.wall.length
+        new = replace(surface, points=self.place(q)[0], places=places)
+        before = _unit(_across(replace(surface, points=self.place(self.start)[0])))
+        across, corners = _across(new), new.points[new.triangles]
+        sides = np.roll(corners, -1, axis=1) - corners
+        quality = 2.0 * math.sqrt(3.0) * np.linalg.norm(across, axis=1)
+        quality /= np.sum(sides**2, axis=(1, 2))
+        turned = np.sum(_unit(across) * before, axis=1) < -0.5
+        if not quality.min() > THINNEST or turned.any():
+            raise NoSurface('the surface collapses: it pinches off or turns over', 'collapsed')
+        if not 0.0 <= places.min() <= places.max() <= 1.0:
+            raise NoSurface('the contact line reaches the end of the wall', 'rim')
+        return new
+
+    def value(self, q: Array) -> tuple[float, Array]:
+        """Return the energy and its gradient."""
+        x, d, _ = self.place(q)
+        area, moment, on_vertices = self._on_vertices(x)
+        wet, _, raised = self.wall.integrals(q[self.ring])
+        slope: Array = np.sum(on_vertices * d, axis=1)
+        slope[self.ring] += self.weight * raised[1] - self.cosine * wet[1]
+        onto_wall = float(np.sum(self.weight * raised[0] - self.cosine * wet[0]))
+        return area + self.weight * moment + onto_wall, slope
+
+    def volume(self) -> float:
+        """Return the volume of the liquid under the given surface."""
+        corners = self.place(self.start)[0][self.triangles]
+        up = _triangles(corners)[0][:, 2]
+        under = self.wall.integrals(self.start[self.ring])[1]
+        return float(up @ corners[..., 2].sum(axis=1) / 6.0 + under[0].sum())
+
+    def _on_vertices(self, x: Array) -> tuple[float, float, Array]:
+        """Return area and moment under the free surface, and the energy's gradient in space."""
+        normal, length, opposite, sums, square = _triangles(x[self.triangles])
+        # d(n·N)/dx = opposite × n, for any fixed n.
+        on = 0.5 * np.cross(opposite, (normal / length[:, None])[:, None, :])
+        on += self.weight * square[:, None, None] * np.cross(opposite, (0.0, 0.0, 1.0))
+        on[..., 2] += self.weight * normal[:, 2:] * sums / 24.0
+        where, count = self.triangles.ravel(), len(x)
+        columns = [np.bincount(where, on[..., k].ravel(), minlength=count) for k in range(3)]
+        return 0.5 * float(length.sum()), float(square @ normal[:, 2]), np.stack(columns, axis=1)
+
+    def matrix(self, q: Array) -> Any:
+        """Return the Hessian of the energy, sparse."""
+        from scipy.sparse import coo_matrix
+
+        x, d, dd = self.place(q)
+        along, bend = d[self.triangles], dd[self.triangles]
+        normal, length, opposite, sums, square = _triangles(x[self.triangles])
+        first = np.cross(along, opposite)  # dN/dq
+        second = np.zeros((len(normal), 3, 3, 3))
+        for k in range(3):
+            after = (k + 1) % 3
+            second[:, k, after] = second[:, after, k] = np.cross(along[:, k], along[:, after])
+            second[:, k, k] = np.cross(bend[:, k], opposite[:, k])
+        grows = np.einsum('tk,tak->ta', normal / length[:, None], first)
+        h = 0.5 * np.einsum('tk,tabk->tab', normal / length[:, None], second)
+        h += 0.5 * np.einsum('tak,tbk->tab', first, first) / length[:, None, None]
+        h -= 0.5 * grows[:, :, None] * grows[:, None, :] / length[:, None, None]
+        rise, same = along[..., 2], np.eye(3)
+        lift = (1.0 + same) * rise[:, :, None] * rise[:, None, :]
+        lift += same * (sums * bend[..., 2])[:, :, None]
+        mixed = (sums * rise)[:, :, None] * first[:, None, :, 2]
+        lifted = lift * normal[:, 2, None, None] + mixed + mixed.transpose(0, 2, 1)
+        h += self.weight * (lifted / 24.0 + square[:, None, None] * second[..., 2])
+        rows = np.broadcast_to(self.triangles[:, :, None], h.shape).ravel()
+        columns = np.broadcast_to(self.triangles[:, None, :], h.shape).ravel()
+        wet, _, raised = self.wall.integrals(q[self.ring])
+        data = np.append(h.ravel(), self.weight * raised[2] - self.cosine * wet[2])
+        at = np.append(rows, self.ring), np.append(columns, self.ring)
+        return coo_matrix((data, at), shape=(q.size, q.size)).tocsr()
+
+    def force(self, surface: _Surface) -> Array:
+        """Return the force on the pad: minus dE/dx if pad and contact line move by x.
+
+        Each vertex moves by a share of x, on which the force does not depend in equilibrium. The
+        shares are harmonic on the graph of edges: they spread over the surface and average the
+        errors of the mesh.
+        """
+        from scipy.sparse import diags
+        from scipy.sparse.linalg import spsolve
+
+        near = _near(surface)
+        laplace = (diags(near.sum(axis=1)) - near).tocsc()
+        share = np.zeros(len(self.base))
+        free = np.setdiff1d(np.arange(share.size), np.append(surface.ring, surface.far))
+        share[surface.ring] = 1.0
+        share[free] = spsolve(laplace[free][:, free], -(laplace @ share)[free])
+        cost = share @ self._on_vertices(self.place(self.start)[0])[2]
+        cost[2] += self.weight * self.wall.integrals(self.start[self.ring])[1][0].sum()
+        force: Array = -cost
+        return force
+
+
+class _WallRails:
+    """The rails of the contact line: positions and wetting integrals as splines in arc length."""
+
+    def __init__(self, curves: Array) -> None:
+        from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+        width = 2.0 * math.pi / len(curves)
+        # Between vertices the line is straight. Areas of the wall use the same polygon as the
+        # surface; otherwise films would spread without limit near complete wetting.
+        chord, apothem = np.sinc(0.5 * width / math.pi), math.cos(0.5 * width)
+        self.length = np.hypot(*np.moveaxis(np.diff(curves, axis=1), -1, 0)).sum(axis=1)
+        azimuths = _turns(len(curves))
+        self.outwards = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+
+        # Splines over 0..1, the same knots for all rails.
+        knots = np.linspace(0.0, 1.0, KNOTS)
+        along = CubicSpline(knots, np.swapaxes(curves, 0, 1), axis=0)  # (knot, rail, 2)
+        nodes, weights = np.polynomial.legendre.leggauss(4)
+        inner = (knots[:-1, None] + 0.5 * (nodes + 1.0) * np.diff(knots)[:, None]).ravel()
+
+        def around(values: Array) -> Array:
+            return (np.roll(values, -1, axis=1) - np.roll(values, 1, axis=1)) / (2.0 * width)
+
+        def rates(t: Array) -> Array:
+            """Return derivatives over t of the integrals of :meth:`integrals`: (t, rail, 3)."""
+            (r, z), (rt, zt) = (np.moveaxis(along(t, k), -1, 0) for k in (0, 1))
+            skew = np.hypot(r * np.hypot(apothem * rt, zt), rt * around(z) - zt * around(r))
+            covered = apothem * r * rt
+            fields = np.stack([skew, z * covered, 0.5 * z**2 * covered], axis=-1)
+            return fields * chord * width
+
+        cells = rates(inner).reshape(KNOTS - 1, 4, -1, 3)
+        sums = np.einsum('kgrf,g->krf', cells, weights) * (0.5 / (KNOTS - 1))
+        totals = np.concatenate([np.zeros((1, *sums.shape[1:])), np.cumsum(sums, axis=0)])
+        integrals = CubicHermiteSpline(knots, totals, rates(knots), axis=0)
+        self.pieces = np.concatenate([along.c, integrals.c], axis=-1)  # (power, cell, rail, 5)
+
+    def _fields(self, s: Array) -> Array:
+        """Return value, first and second derivative over arc length, shape (3, rail, 5)."""
+        t = s / self.length * (KNOTS - 1)
+        cell = np.clip(t.astype(np.int64), 0, KNOTS - 2)
+        u = ((t - cell) / (KNOTS - 1))[:, None]
+        c3, c2, c1, c0 = self.pieces[:, cell, np.arange(s.size)]
+        scale = 1.0 / self.length[:, None]
+        return np.stack(
+            [
+                ((c3 * u + c2) * u + c1) * u + c0,
+                ((3.0 * c3 * u + 2.0 * c2) * u + c1) * scale,
+                (6.0 * c3 * u + 2.0 * c2) * scale**2,
+            ]
+        )
+
+    def place(self, s: Array) -> Array:
+        """Return positions and their derivatives, shape (3, vertex, 3)."""
+        fields = self._fields(s)
+        return np.concatenate([fields[..., :1] * self.outwards, fields[..., 1:2]], axis=-1)
+
+    def integrals(self, s: Array) -> Array:
+        """Return wet area, volume and moment: (3, 3 derivatives, vertex)."""
+        return np.moveaxis(self._fields(s)[..., 2:], -1, 0)
+
+
+# --- Meshes ------------------------------------------------------------------------------------
+
+
+def _edges(triangles: Indices) -> Indices:
+    """Return both corners of each edge, shape (n, 2), in order."""
+    return np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
+
+
+def _near(surface: _Surface) -> Any:
+    """Return a sparse array with 1 for each pair of neighbours."""
+    from scipy.sparse import coo_array
+
+    edges, count = _edges(surface.triangles), len(surface.points)
+    pairs = np.concatenate([edges, edges[:, ::-1]]).T
+    return coo_array((np.ones(pairs.shape[1]), pairs), shape=(count, count)).tocsr()
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
+
+
+def _across(surface: _Surface) -> Array:
+    """Return normals of triangles, as long as twice their areas."""
+    a, b, c = np.moveaxis(surface.points[surface.triangles], 1, 0)
+    return np.cross(b - a, c - a)
+
+
+def _triangles(corners: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Return normals N, their lengths, opposite edges, z + Σ z by corner, moments per N_z."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
+    opposite = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)
+    z = corners[..., 2]
+    total = z.sum(axis=1)
+    square = ((z**2).sum(axis=1) + total**2) / 48.0  # (Σ z² + Σ z z' over pairs) / 24
+    return normal, length, opposite, z + total[:, None], square
+
+
+def _normals(surface: _Surface) -> Array:
+    """Return unit normals at vertices, weighted by area."""
+    across, total = _across(surface), np.zeros_like(surface.points)
+    for corner in surface.triangles.T:
+        np.add.at(total, corner, across)
+    return _unit(total)

@@ -346,15 +346,15 @@ def _option(name: str) -> str:
 def _values(found: Wet | WetPattern | WetSurface, direction: float) -> dict[str, Any]:
     if isinstance(found, WetSurface):
         away = found.line[:, :2] - found.axis
-        height = float(found.line[:, 2].mean())
+        height = found.mean_height
         return {
             'status': 'ok',
             'height_m': height,
             'height_spread_m': float(np.ptp(found.line[:, 2])),
             'ring_radius_m': float(np.hypot(*away.T).mean()),
             'pressure_pa': -found.liquid.density * GRAVITY * height,
-            'volume_m3': found.surface.volume,
-            'pull_n': float(-found.surface.forces[0, 2]),
+            'volume_m3': found.volume,
+            'pull_n': float(-found.force[2]),
             'azimuths_deg': np.degrees(np.mod(np.arctan2(*away.T[::-1]), 2.0 * math.pi)),
             'heights_m': found.line[:, 2],
         }

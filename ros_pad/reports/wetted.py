@@ -77,7 +77,7 @@ def picture(mesh: Mesh, found: Wet | WetPattern | WetSurface) -> Picture:
 
 def _near(mesh: Mesh, found: WetSurface) -> Array:
     """Return the triangles of a surface that are near the pad, mm."""
-    corners = found.surface.vertices[found.surface.triangles]
+    corners = found.vertices[found.triangles]
     far = np.hypot(*np.moveaxis(corners[:, :, :2] - found.axis, 2, 0)).max(axis=1)
     wide = float(np.hypot(*(mesh.points[:, :2] - found.axis).T).max())
     return 1e3 * corners[far < _SURROUNDINGS * wide]

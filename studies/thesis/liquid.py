@@ -17,17 +17,15 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ros_pad.capillary import (
     BathMeniscus,
-    Face,
-    LiquidSurface,
     Mesh,
     Wall,
     Wet,
     WetPattern,
+    WetSurface,
     bath_meniscus,
-    bath_surface,
-    pattern_surface,
     wet,
     wet_pattern,
+    wet_surface,
 )
 from ros_pad.contact.dome import press
 from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid
@@ -140,9 +138,9 @@ def lobed() -> Mesh:
 
 
 @functools.cache
-def lobed_surface() -> LiquidSurface:
+def lobed_surface() -> WetSurface:
     """Return the surface of minimum energy around the pad of a general shape."""
-    return bath_surface(Face.of_mesh((lobed().points, lobed().faces)), _HALF, refinements=1)
+    return wet_surface(lobed(), _HALF)
 
 
 @functools.cache
@@ -161,7 +159,7 @@ def bodies() -> dict[str, Found]:
         height = bath_meniscus(wall=wall, liquid=_HALF).height
         found[name] = Found(mesh, _by_balance(mesh), height, 0.0)
     surface = lobed_surface()
-    line = surface.vertices[surface.lines[0].vertices, 2]
+    line = surface.line[:, 2]
     found['general shape'] = Found(
         lobed(), _by_balance(lobed()), float(line.mean()), float(np.ptp(line))
     )
@@ -192,10 +190,7 @@ def one_sided(found: BathMeniscus, liquid: Liquid) -> float:
 def in_pattern(pitch: float) -> float:
     """Return the height of water on one dome of many, m, by the surface of minimum energy."""
     wall = Wall.dome(*dome(), 2.2e-3)
-    found = pattern_surface(
-        Face.of_wall(wall), WATER, pitch, pressure=0.0, sectors=24, refinements=1
-    )
-    return float(found.vertices[found.lines[0].vertices, 2].mean())
+    return wet_surface(wall, WATER, math.sqrt(0.75) * pitch**2).mean_height
 
 
 def filled(pitch: float, balance: str) -> WetPattern:
@@ -317,7 +312,7 @@ def _readings_of_417() -> _Readings:
 def _claims_27(readings: _Readings) -> tuple[Claim, ...]:
     forces = readings.forces
     surface = lobed_surface()
-    net = 1e6 * float(np.hypot(*surface.forces[0, :2]))
+    net = 1e6 * float(np.hypot(*surface.force[:2]))
     general = 1e6 * abs(bodies()['general shape'].layers['energy'].force(0.0))
     return (
         claim(

@@ -20,15 +20,15 @@ from scipy.optimize import brentq
 from scipy.special import k0e, k1e
 
 from ros_pad.capillary import (
-    Face,
     Mesh,
     Wall,
     Wet,
     WetPattern,
+    WetSurface,
     bath_meniscus,
-    bath_surface,
     wet,
     wet_pattern,
+    wet_surface,
 )
 from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid
 from ros_pad.contact.pad import Array
@@ -293,8 +293,7 @@ def _layers(shape: Shape, balance: str, size: tuple[int, ...]) -> Callable[[Liqu
 
 
 def _minimised(shape: Shape, sectors: int, refinements: int) -> Callable[[Liquid], Any]:
-    face = Face.of_wall(shape.wall)
-    return lambda liquid: bath_surface(face, liquid, sectors=sectors, refinements=refinements)
+    return lambda liquid: wet_surface(shape.wall, liquid, None, sectors, refinements)
 
 
 def _read(shape: Shape, found: Any) -> tuple[Pair | None, str]:
@@ -306,9 +305,8 @@ def _read(shape: Shape, found: Any) -> tuple[Pair | None, str]:
         if status != 'ok':
             return None, status
         return (found.mean_height, weight_lifted(found, shape.solid)), status
-    if hasattr(found, 'lines'):
-        line = found.vertices[found.lines[0].vertices, 2]
-        return (float(line.mean()), -float(found.forces[0, 2])), 'ok'
+    if isinstance(found, WetSurface):
+        return (found.mean_height, -float(found.force[2])), 'ok'
     if found.status not in ('ok', 'several'):
         return None, found.status
     return (found.height, found.force), found.status
@@ -454,9 +452,7 @@ def traps() -> list[Trap]:
         rows.append(trap(balance, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
     answer = outcome(lambda: bath_meniscus(wall=low.wall, liquid=wetting))
     rows.append(trap(EXACT, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
-    answer = outcome(
-        lambda: bath_surface(Face.of_wall(low.wall), wetting, sectors=12, refinements=0)
-    )
+    answer = outcome(lambda: wet_surface(low.wall, wetting, sectors=12, refinements=0))
     rows.append(trap('minimised', 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
     half, wide = dome(1.436e-3), Liquid(0.073, 0.7 * 0.073)
     answer = outcome(lambda: wet(half.mesh(48, 72), wide, 'thesis'), half)

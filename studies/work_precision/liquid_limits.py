@@ -5,7 +5,7 @@ Prints the number of returned heights, and of volumes between pads, with the ran
 and the same of refused ones: with the limits of ros_pad.capillary.layers as shipped, and with each
 of these limits halved and doubled (angles in rad, up to 90 degrees). Single pads, domes and cones
 from 0.01 to 3 capillary lengths, are compared with the exact meniscus of a wide bath
-(``bath_meniscus``), patterns of domes with the surface of minimum energy (``pattern_surface``).
+(``bath_meniscus``), patterns of domes with the surface of minimum energy (``wet_surface``).
 """
 
 from __future__ import annotations
@@ -16,16 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_pad.capillary import (
-    Face,
-    Mesh,
-    Wall,
-    bath_meniscus,
-    layers,
-    pattern_surface,
-    wet,
-    wet_pattern,
-)
+from ros_pad.capillary import Mesh, Wall, bath_meniscus, layers, wet, wet_pattern, wet_surface
 from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.errors import MeshError, NoSurface
 from studies import command
@@ -158,13 +149,12 @@ def pads() -> Iterator[Case]:
 
 def patterns() -> Iterator[Case]:
     """Yield domes of a hexagonal pattern for which the reference has a result."""
-    face = Face.of_wall(Wall.dome(*FOOT))
+    wall = Wall.dome(*FOOT)
     dome = Mesh.dome(*FOOT, rings=48, sectors=72)
     for liquid in command.each(LIQUIDS, 'patterns', 'liquid'):
         for pitch in PITCHES:
             try:
-                drawn = pattern_surface(face, liquid, pitch, pressure=0.0, sectors=24)
+                drawn = wet_surface(wall, liquid, math.sqrt(0.75) * pitch**2)
             except (MeshError, NoSurface):
                 continue
-            exact = float(drawn.vertices[drawn.lines[0].vertices, 2].mean())
-            yield Case(dome, liquid, exact, math.sqrt(0.75) * pitch**2, drawn.volume)
+            yield Case(dome, liquid, drawn.mean_height, math.sqrt(0.75) * pitch**2, drawn.volume)
