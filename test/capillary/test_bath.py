@@ -84,17 +84,6 @@ def test_surface_ends_in_the_bath_at_the_contact_angle(wall, degrees):
     assert runs_under(found, -1e-7) and not runs_under(found, 1e-7)
 
 
-def test_dome_geometry_at_the_contact_line():
-    found = rise(Wall.dome(0.5, 0.3), 25)
-    start = math.asin(0.6)
-    phi = math.acos(math.cos(start) - found.height / 0.5)
-    assert found.radius == pytest.approx(0.5 * math.sin(phi), rel=1e-12)
-    assert found.slope == pytest.approx(math.pi - phi - math.radians(25), rel=1e-12)
-    assert (found.radii[0], found.heights[0]) == pytest.approx(
-        (found.radius, found.height), rel=1e-9
-    )
-
-
 def test_force_is_pull_and_suction():
     """The force on a cone is tension at the contact line and suction on each ring of its wall."""
     lean, rest = 1.0 / math.tan(0.7), 0.4
@@ -140,16 +129,6 @@ def test_right_angle_raises_nothing_on_a_cylinder_and_more_pushes_down():
     assert faint.height > 0.0 and ratio == pytest.approx(100.0, rel=1e-6)
 
 
-def test_a_pad_on_the_floor_stays_dry_where_liquid_is_pushed_down():
-    found = rise(Wall.dome(0.5, 0.4), 150)
-    assert (found.height, found.force, found.status) == (0.0, 0.0, 'dry')
-    assert found.radius == pytest.approx(0.4)
-    assert rise(Wall.cone(0.4, 1.6), 90).status == 'dry'
-    assert (
-        rise(Wall.dome(0.5, 0.4), 100).status == 'ok'
-    )  # the wall overhangs and holds liquid below it
-
-
 def test_edge_of_the_wall_holds_the_liquid():
     free = rise(Wall.cylinder(0.4), 10)
     held = rise(Wall.cylinder(0.4, height=0.5 * free.height), 10)
@@ -177,16 +156,6 @@ def test_profile_through_points_converges():
         z = 0.5 * (math.cos(phi[0]) - np.cos(phi))
         errors.append(abs(rise(Wall.through(0.5 * np.sin(phi), z), 30).height / exact - 1.0))
     assert errors[0] < 5e-4 and errors[1] < errors[0] / 8.0  # the method is of second order
-
-
-def test_units():
-    found = bath_meniscus(0.5e-3, 0.2e-3, liquid=WATER)
-    length = math.sqrt(WATER.surface_tension / (WATER.density * 9.81))
-    wall = Wall.dome(0.5e-3 / length, 0.2e-3 / length)
-    unit = rise(wall, math.degrees(WATER.angle))
-    assert found.height == pytest.approx(length * unit.height, rel=1e-9)
-    assert found.force == pytest.approx(WATER.surface_tension * length * unit.force, rel=1e-8)
-    assert found.volume == pytest.approx(found.force / 9810.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

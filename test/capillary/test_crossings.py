@@ -11,7 +11,6 @@ import re
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 from ros_pad.capillary import Mesh
@@ -82,7 +81,7 @@ def inner(mesh: Mesh, sectors: int, heights: np.ndarray) -> np.ndarray:
 # --- Bodies that overlap, and bodies that do not -----------------------------------------------
 
 
-@pytest.mark.parametrize('seed', range(60))
+@pytest.mark.parametrize('seed', range(12))
 def test_domes_overlap_or_not_at_any_azimuth(seed: int):
     rng = np.random.default_rng(seed)
     rings, sectors = rng.integers([3, 3], [32, 64], (2, 2)).T.tolist()
@@ -111,19 +110,6 @@ def test_domes_overlap_or_not_at_any_azimuth(seed: int):
         widest = np.hypot(*(body.points[:, :2] - middle).T).max()
         assert math.dist(place[:2], middle) < 1.001 * widest
         assert -1e-9 <= place[2] <= 1.001 * body.height
-
-
-@pytest.mark.parametrize('width', [1e-6, 1e-5, 2e-4])
-@pytest.mark.parametrize('turn', [0.0, 0.3, math.pi / 4.0])
-def test_a_needle_through_a_coarse_plate(width: float, turn: float):
-    # The plate is up to ten thousand times as wide as the needle, whose triangles are very slim.
-    plate = box([-5e-3, -5e-3, 0.0], [5e-3, 5e-3, 0.5e-3])
-    needle = moved(Mesh.cone(width, 0.5 * width, 1e-3, 3, 5), 1.234e-3, -0.77e-3, turn)
-    place = overlap(plate, needle)
-    # The place is at the top of the plate, or on the floor, where both bodies stand.
-    assert np.allclose(place[:2], [1.234e-3, -0.77e-3], rtol=0.0, atol=2.0 * width)
-    assert min(abs(place[2]), abs(place[2] - 0.5e-3)) < 1e-9
-    together(plate, moved(needle, 5e-3))  # beside the plate
 
 
 def test_small_bodies_between_large_triangles_are_found():
@@ -172,47 +158,12 @@ def test_boxes_with_faces_in_common_planes_overlap(low, high, turn: float, kind)
     assert (back <= np.minimum(high, 1e-3) + 1e-6).all()
 
 
-def test_prisms_whose_sides_cross_in_edges_of_both_overlap():
-    one = Mesh.cylinder(1e-3, 2e-3, 1, 6)
-    for other, top in ((one, 2e-3), (Mesh.cylinder(1e-3, 1e-3, 1, 6), 1e-3)):
-        x, y, z = overlap(one, moved(other, 1e-3))
-        assert 0.0 <= x <= 1e-3  # between the axes of the prisms
-        assert abs(y) < 0.9e-3
-        assert 0.0 <= z <= top
-
-
 OCTAHEDRON = np.array(
     [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float
 )
 OCTAHEDRON_FACES = np.array(
     [[k, (k + 1) % 4, 4] for k in range(4)] + [[(k + 1) % 4, k, 5] for k in range(4)]
 )
-
-
-@pytest.mark.parametrize('shift', [0.0, 0.25, -0.5])
-@pytest.mark.parametrize('turn', [0.0, 0.25, 0.5, 0.7])
-def test_corners_and_edges_in_a_face_that_the_body_passes_through(turn: float, shift: float):
-    # A face of the cube cuts the octahedron, of which corners or edges can lie in that face.
-    c, s = math.cos(turn * math.pi / 2.0), math.sin(turn * math.pi / 2.0)
-    points = OCTAHEDRON @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    points = 1e-4 * np.where(np.abs(points) < 1e-12, 0.0, points) + 1e-3 * np.array([1, 0.4, 0.7])
-    points[:, 0] += 1e-4 * shift
-    faces = np.concatenate([CUBE_FACES, OCTAHEDRON_FACES + 8])
-    for kind in (float, np.float32):
-        what, place = refusal(np.concatenate([CUBE, points]).astype(kind).astype(float), faces)
-        assert what == 'bodies overlap'
-        assert math.dist(place, 1e-3 * np.array([1, 0.4, 0.7])) < 1.01e-4
-    points[:, 0] += 1e-3 - points[:, 0].min()  # now it only touches from outside
-    Mesh(np.concatenate([CUBE, points]), faces)
-
-
-def test_a_ring_of_corners_in_the_top_of_a_plate():
-    plate = Mesh(CUBE * [10.0, 10.0, 1.0], CUBE_FACES, 'plate')
-    points, faces = arrays(plate, Mesh.cylinder(1e-3, 1e-3, 2, 24))
-    points[8:] += [5e-3, 5e-3, 0.5e-3]
-    place = refusal(points, faces)[1]
-    assert math.dist(place[:2], [5e-3, 5e-3]) < 1.01e-3
-    assert 0.5e-3 < place[2] < 1.001e-3
 
 
 TOUCHING = [
@@ -272,21 +223,6 @@ def test_walls_of_slim_triangles_that_touch_do_not_overlap():
     assert refusal(points, both)[0] == 'bodies overlap'
 
 
-@pytest.mark.parametrize('sectors', [6, 12, 48])
-def test_domes_whose_rims_touch_do_not_overlap(sectors: int):
-    dome = Mesh.dome(R, B, None, 8, sectors)
-    for k in range(sectors):
-        azimuth = 2.0 * math.pi * k / sectors
-        d = outer(dome, azimuth) + outer(dome, azimuth + math.pi)
-        points, faces = arrays(dome, moved(dome, d * math.cos(azimuth), d * math.sin(azimuth)))
-        for kind in (float, np.float32):
-            both = Mesh(points.astype(kind).astype(float), faces)
-            assert both.volume == pytest.approx(2.0 * dome.volume, rel=1e-4)
-    few = Mesh.dome(R, B, rings=4, sectors=sectors)
-    many = Mesh.dome_pattern(19, 2.0 * R * (1.0 + 1e-12), R, B, rings=4, sectors=sectors)
-    assert many.volume == pytest.approx(19.0 * few.volume, rel=1e-9)
-
-
 SHAPES = [
     Mesh.dome(R, B, rings=24, sectors=36),
     Mesh.dome(R, 0.0, 2.0 * R - 1e-6, rings=40, sectors=60),
@@ -319,45 +255,6 @@ def hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     faces = np.where(inward[:, None], found.simplices[:, ::-1], found.simplices)
     used, names = np.unique(faces, return_inverse=True)
     return points[used], names.reshape(faces.shape), found.equations
-
-
-@pytest.mark.parametrize('kind', ['grid', 'slim'])
-@pytest.mark.slow
-def test_convex_bodies_overlap_where_a_ball_fits_into_both(kind: str):
-    rng = np.random.default_rng(7)
-    counts = {True: 0, False: 0}
-    for _ in range(400):
-        if kind == 'grid':  # corners, edges and faces of one often lie on those of the other
-            two = [rng.integers(0, 4, (rng.integers(4, 9), 3)) * 1e-3 for _ in range(2)]
-            if any(np.linalg.matrix_rank(each - each[0], 1e-9) < 3 for each in two):
-                continue
-        else:
-            two = []
-            for _ in range(2):
-                wide = rng.normal(size=(rng.integers(4, 25), 3)) * 10.0 ** rng.uniform(-3, 0, 3)
-                turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-                two.append(1e-3 * (wide @ turn + 0.1 * rng.normal(size=3)))
-        (one, first, planes), (other, second, more) = (hull(each) for each in two)
-        limits = 1e3 * np.concatenate([planes, more])
-        # The largest ball, mm, within all half spaces fits into both bodies.
-        ball = linprog(
-            [0.0, 0.0, 0.0, -1.0],
-            A_ub=np.column_stack([1e-3 * limits[:, :3], np.ones(len(limits))]),
-            b_ub=-limits[:, 3],
-            bounds=(None, None),
-        )
-        depth = -1e-3 * ball.fun
-        points = np.concatenate([one, other])
-        points[:, 2] -= points[:, 2].min()
-        if 1e-12 < depth / np.abs(points).max() < 5e-6:
-            continue  # rounding may decide
-        faces = np.concatenate([first, second + len(one)])
-        counts[depth > 1e-14] += 1
-        if depth > 1e-14:
-            assert refusal(points, faces)[0] == 'bodies overlap'
-        else:
-            Mesh(points, faces)
-    assert min(counts.values()) > 30
 
 
 # --- Single bodies that cut themselves ----------------------------------------------------------
@@ -416,21 +313,3 @@ def test_a_body_within_another_is_found(z: float, size: float):
         assert what == 'bodies overlap'
         assert math.dist(place[:2], [0.2e-3, 0.1e-3]) <= 1.5 * size
         assert z - 1e-9 <= place[2] <= z + size
-
-
-def test_a_pin_in_a_bore_is_in_no_body():
-    turns = 2.0 * math.pi * np.arange(60) / 60
-    ring = np.column_stack([np.cos(turns), np.sin(turns)])
-    profile = [(1e-3, 0.0), (2e-3, 0.0), (2e-3, 3e-3), (1e-3, 3e-3)]
-    points = np.concatenate([np.column_stack([r * ring, np.full(60, z)]) for r, z in profile])
-    here, there = np.arange(60), np.roll(np.arange(60), -1)
-    faces = []
-    for k in range(4):
-        low, high = 60 * k, 60 * ((k + 1) % 4)
-        faces.append(np.column_stack([low + here, low + there, high + there]))
-        faces.append(np.column_stack([low + here, high + there, high + here]))
-    washer = Mesh(points, np.concatenate(faces), 'washer')
-    together(washer, Mesh.cylinder(0.9e-3, 2e-3))
-    together(washer, Mesh.cylinder(1e-3, 3e-3, 1, 60))  # a tight fit
-    place = overlap(washer, Mesh.cylinder(1.02e-3, 2e-3))
-    assert 0.99e-3 < math.hypot(*place[:2]) < 1.03e-3
