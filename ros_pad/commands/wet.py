@@ -95,113 +95,71 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--figure', metavar='FILE', help='draw the wetted mesh into a .png, .pdf or .svg'
     )
-    part.add_argument(
-        '--html', metavar='FILE', help='write a page on which the mesh can be turned'
-    )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def _add_mesh(part: argparse.ArgumentParser) -> None:
     shape = part.add_argument_group('shapes')
-    shape.add_argument('--radius', type=float, metavar='M', help='radius of sphere or cylinder, m')
-    shape.add_argument(
-        '--contact-radius', type=float, metavar='M', help='radius of the contact disc, m'
-    )
-    shape.add_argument(
-        '--top-radius', type=float, metavar='M', help='radius of a cone at its top, m'
-    )
-    shape.add_argument(
-        '--height',
-        type=float,
-        metavar='M',
-        help='m (default for a dome: up to its widest section)',
-    )
-    shape.add_argument('--pitch', type=float, metavar='M', help='distance of pads in a pattern, m')
-    shape.add_argument(
-        '--rings', type=int, metavar='N', help='number of bands of triangles from floor to top'
-    )
-    shape.add_argument(
-        '--sectors', type=int, metavar='N', help='number of triangles round the axis'
-    )
+    for name, text in (
+        ('radius', 'radius of sphere or cylinder, m'),
+        ('contact-radius', 'radius of the contact disc, m'),
+        ('top-radius', 'radius of a cone at its top, m'),
+        ('height', 'm (default for a dome: up to its widest section)'),
+        ('pitch', 'distance of pads in a pattern, m'),
+    ):
+        shape.add_argument(f'--{name}', type=float, metavar='M', help=text)
+    text = 'number of bands of triangles from floor to top'
+    shape.add_argument('--rings', type=int, metavar='N', help=text)
+    text = 'number of triangles round the axis'
+    shape.add_argument('--sectors', type=int, metavar='N', help=text)
     file = part.add_argument_group('files')
-    file.add_argument(
-        '--scale', type=float, metavar='S', help='unit of the file in m: 1e-3 for mm (default 1)'
-    )
-    file.add_argument(
-        '--lift', type=float, metavar='M', help='added to all heights, m (default 0)'
-    )
-    file.add_argument(
-        '--flip', action='store_true', help='reverse the faces of a mesh that is inside out'
-    )
+    text = 'unit of the file in m: 1e-3 for mm (1)'
+    file.add_argument('--scale', type=float, metavar='S', help=text)
+    file.add_argument('--lift', type=float, metavar='M', help='added to all heights, m (0)')
+    text = 'reverse the faces of a mesh that is inside out'
+    file.add_argument('--flip', action='store_true', help=text)
 
 
 def _add_liquid(part: argparse.ArgumentParser) -> None:
-    liquid = part.add_argument_group('liquid')
-    liquid.add_argument(
-        '--liquid',
-        choices=tuple(LIQUIDS),
-        default='water',
-        help="surface tensions of water on silicone (default), or those of the thesis' appendix",
-    )
-    liquid.add_argument(
-        '--tension', type=float, metavar='N/M', help='surface tension of another liquid, N/m'
-    )
-    liquid.add_argument('--angle', type=float, metavar='DEG', help='contact angle, degrees')
-    liquid.add_argument('--density', type=float, metavar='KG/M3', help='density, kg/m³')
-    many = part.add_argument_group('many pads')
-    many.add_argument('--pads', type=int, metavar='N', help='number of pads on the area')
-    many.add_argument(
-        '--area', type=float, metavar='M2', help='area of all pads with the gaps between them, m²'
-    )
+    liquid = part.add_argument_group('liquid').add_argument
+    text = "surface tensions of water on silicone (default), or those of the thesis' appendix"
+    liquid('--liquid', choices=tuple(LIQUIDS), default='water', help=text)
+    liquid('--tension', type=float, metavar='N/M', help='surface tension of another liquid, N/m')
+    liquid('--angle', type=float, metavar='DEG', help='contact angle, degrees')
+    liquid('--density', type=float, metavar='KG/M3', help='density, kg/m³')
+    many = part.add_argument_group('many pads').add_argument
+    many('--pads', type=int, metavar='N', help='number of pads on the area')
+    many('--area', type=float, metavar='M2', help='of all pads with the gaps between them, m²')
 
 
 def _add_method(part: argparse.ArgumentParser) -> None:
-    part.add_argument(
-        '--method', choices=('layers', 'energy'), default='layers', help='see above (%(default)s)'
-    )
-    part.add_argument(
-        '--balance', choices=BALANCES, help='of layers: what gives the height (energy)'
-    )
-    part.add_argument(
-        '--loose',
-        action='store_true',
-        help='also accept heights with large errors: to compare, not to use',
-    )
-    part.add_argument(
-        '--layers',
-        type=int,
-        metavar='N',
-        help='number of layers from floor to top (100; many pads 200)',
-    )
-    part.add_argument(
-        '--slices', type=int, metavar='N', help='number of slices round the axis (36)'
-    )
-    part.add_argument(
-        '--direction',
-        type=float,
-        default=0.0,
-        metavar='DEG',
-        help='azimuth of the force, degrees (0)',
-    )
-    part.add_argument(
-        '--hysteresis',
-        type=float,
-        nargs=2,
-        metavar=('ADVANCING', 'RECEDING'),
-        help='contact angles, degrees: the capillary force is then that of the pinned line',
-    )
+    add = part.add_argument
+    add('--method', choices=('layers', 'energy'), default='layers', help='see above (%(default)s)')
+    add('--balance', choices=BALANCES, help='of layers: what gives the height (energy)')
+    text = 'also accept heights with large errors: to compare, not to use'
+    add('--loose', action='store_true', help=text)
+    text = 'number of layers from floor to top (100; many pads 200)'
+    add('--layers', type=int, metavar='N', help=text)
+    add('--slices', type=int, metavar='N', help='number of slices round the axis (36)')
+    text = 'azimuth of the force, degrees (0)'
+    add('--direction', type=float, default=0.0, metavar='DEG', help=text)
+    angles = ('ADVANCING', 'RECEDING')
+    text = 'contact angles, degrees: the capillary force is then that of the pinned line'
+    add('--hysteresis', type=float, nargs=2, metavar=angles, help=text)
 
 
 def run(options: argparse.Namespace) -> int:
     """Find the height of the liquid on the mesh and print it; return the exit status."""
     number('--direction', options.direction, 'degrees', low=-math.inf)
-    check_pictures(options.figure, options.html)
+    check_pictures(options.figure)
     liquid = _liquid(options)
     try:
         with bar('wetting', 2.0, 'steps', delay=1.0) as progress:
             mesh = _mesh(options)
             progress(1.0)
             many = options.area is not None or options.mesh == 'pattern'
+            if options.pads is not None and not many:
+                raise InvalidInput('--pads needs --area, the area of all pads, m²')
             started = time.perf_counter()
             found: Wet | WetPattern | WetSurface
             if options.method == 'energy':
@@ -226,11 +184,12 @@ def run(options: argparse.Namespace) -> int:
         'height_error': _error(found, options),
         'capillary_force_n': _of_a_foot(found, options),
         'figure': options.figure,
-        'html': options.html,
     }
     rows = _rows(values)
-    if options.figure is not None or options.html is not None:
-        _draw(options, mesh, found, rows)
+    if options.figure is not None:
+        from ros_pad.reports import wetted
+
+        wetted.draw(options.figure, mesh, found, math.radians(options.direction))
     if options.json:
         print(json.dumps({name: _plain(value) for name, value in values.items()}))
     else:
@@ -297,8 +256,6 @@ def _mesh(options: argparse.Namespace) -> Mesh:
 
 
 def _round(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> Wet:
-    if options.pads is not None:
-        raise InvalidInput('--pads needs --area, the area of all pads, m²')
     return wet(
         mesh,
         liquid,
@@ -328,8 +285,6 @@ def _of_least_energy(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) ->
     for name in ('balance', 'layers', 'slices', 'loose'):
         if getattr(options, name) not in (None, False):
             raise InvalidInput(f'{_option(name)} is only for --method layers')
-    if options.pads is not None and options.area is None and options.mesh != 'pattern':
-        raise InvalidInput('--pads needs --area, the area of all pads, m²')
     area = options.area
     if area is not None:
         pads = 1 if options.pads is None else integer('pads', options.pads, 1)
@@ -444,22 +399,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return [_plain(each) for each in value.tolist()]
     return None if isinstance(value, float) and math.isnan(value) else value
-
-
-def _draw(
-    options: argparse.Namespace,
-    mesh: Mesh,
-    found: Wet | WetPattern | WetSurface,
-    rows: list[tuple[str, str]],
-) -> None:
-    from ros_pad.reports import wetted, wetted_page
-
-    with bar('drawing', 2.0, 'files', delay=1.0) as progress:
-        if options.figure is not None:
-            wetted.draw(options.figure, mesh, found, math.radians(options.direction))
-        progress(1.0)
-        if options.html is not None:
-            title = f'{mesh.source}, {options.liquid}'
-            shown = [row for row in rows if row[0] not in ('figure', 'html')]
-            wetted_page.write(options.html, title, shown, wetted.picture(mesh, found))
-        progress(2.0)

@@ -38,7 +38,6 @@ TUNED = {
     'control/morphology.py': ('MorphologyController',),
     'control/policies.py': ('adaptive',),
     'regulators/simulated.py': ('SimulatedRegulator',),
-    'reports/explore.py': ('Inputs',),
 }
 
 
