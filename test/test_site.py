@@ -77,10 +77,13 @@ def test_links_lead_to_pages_and_to_files_of_the_repository(site):
                 assert not anchor or anchor in ids.get(target, {anchor}), f'{page}: {link}'
 
 
-def test_the_gallery_has_every_chart_its_command_and_its_page():
+def test_gallery_and_examples_show_every_chart_and_how_it_is_made():
     text = (DOCS / 'gallery.md').read_text(encoding='utf-8')
     shown = re.findall(r'^!\[.+\]\(charts/(.*)\.png\)\n\n((?:.+\n)+)', text, re.MULTILINE)
-    assert sorted(chart for chart, _ in shown) == sorted(
+    examples = re.findall(
+        r'\(charts/(.*)\.png\)', (DOCS / 'examples.md').read_text(encoding='utf-8')
+    )
+    assert sorted([*(chart for chart, _ in shown), *examples]) == sorted(
         path.stem for path in (DOCS / 'charts').glob('*.png')
     )
     for chart, about in shown:
@@ -89,7 +92,5 @@ def test_the_gallery_has_every_chart_its_command_and_its_page():
         assert (DOCS / page).exists()
         if program == 'pad':
             assert callable(cli.parser(words[0]).parse_args(words).command)
-        elif words[0].startswith('examples/'):
-            assert (ROOT / words[0]).exists(), chart
         else:
             assert words[:2] == ['-m', 'studies'] and words[2] in STUDIES, chart
