@@ -103,10 +103,6 @@ class BadMessage(PadError):
     """The bytes of a message are too few, or do not fit its type."""
 
 
-class UnknownEncoding(BadMessage):
-    """Messages of a type or encapsulation whose fields cannot be read one by one."""
-
-
 class NoConvergence(PadError, ArithmeticError):
     """A step of a simulation has not converged."""
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Definitions of message types, and whole messages of any type, with ``rosbags``.
-
-`ros_pad.bags.fields` reads and writes single fields, which is faster.
-"""
+"""Definitions of message types, messages of any type, and their fields, with ``rosbags``."""
 
 from __future__ import annotations
 
 import functools
+import operator
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -99,6 +98,38 @@ class MessageType:
         return [self._zero(element_kind, element) for _ in range(count)]
 
 
+def field_getter(paths: Sequence[str]) -> Callable[[Any], tuple[Any, ...]]:
+    """Return a function that returns fields of a message.
+
+    Parameters
+    ----------
+    paths : sequence of str
+        Such as ``header.stamp.sec`` or ``twist.covariance[7]``.
+    """
+    names = [path.rstrip(']').partition('[') for path in paths]
+    steps = [(operator.attrgetter(name), place) for name, _, place in names]
+
+    def get(message: Any) -> tuple[Any, ...]:
+        return tuple(
+            value(message)[int(place)] if place else value(message) for value, place in steps
+        )
+
+    return get
+
+
+def put_field(message: Any, path: str, value: Any) -> None:
+    """Set a field of a message of `MessageType`; see :func:`field_getter`."""
+    owner, _, name = path.rpartition('.')
+    target = operator.attrgetter(owner)(message) if owner else message
+    name, _, place = name.rstrip(']').partition('[')
+    before = getattr(target, name)
+    if place:
+        before[int(place)] = value
+    else:
+        array = isinstance(before, np.ndarray)
+        setattr(target, name, np.asarray(value, before.dtype) if array else value)
+
+
 @functools.cache
 def _jazzy() -> Any:
     return get_typestore(Stores.ROS2_JAZZY)
@@ -133,4 +164,4 @@ def message_type(name: str, definition: str = '') -> MessageType:
     return MessageType(name, definition or definition_of(name)[0])
 
 
-__all__ = ['MessageType', 'definition_of', 'message_type']
+__all__ = ['MessageType', 'definition_of', 'field_getter', 'message_type', 'put_field']

@@ -7,15 +7,14 @@ import itertools
 import os
 import pathlib
 import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 from mcap.records import Channel
 
 from ros_pad.bags import metadata
-from ros_pad.bags.codec import MessageType, message_type
-from ros_pad.bags.fields import FieldReader
+from ros_pad.bags.codec import MessageType, field_getter, message_type
 from ros_pad.bags.storage import Contents, RawMessage, raw_messages, scan, shares
 from ros_pad.bags.wire import Wire, legs_of
 from ros_pad.errors import BadMessage, BagError, reason
@@ -196,10 +195,7 @@ class BagReader:
                 channel = channels[channel_id]
                 if channel_id not in types:
                     types[channel_id] = _message_type(file, channel, contents)
-                try:
-                    message = types[channel_id].decode(data)
-                except Exception as error:  # invalid bytes can raise any exception
-                    raise _bad(file, channel.topic, log_time, error) from error
+                message = _decoded(file, channel.topic, types[channel_id], data, log_time)
                 yield channel.topic, message, log_time
 
     def tables(
@@ -286,7 +282,7 @@ class BagReader:
         for file, contents, reach in self._shared(progress):
             channels = {each.id: each for each in _channels(contents, times)}
             readers = {
-                channel.id: _field_reader(file, channel, contents, paths[channel.topic])
+                channel.id: _reader(file, channel, contents, paths[channel.topic])
                 for channel in channels.values()
                 if channel.topic in paths
             }
@@ -295,8 +291,12 @@ class BagReader:
                     topic = channels[channel_id].topic
                     times[topic].append(np.array(log_times, np.int64))
                     if channel_id in readers:
-                        table = _table(file, topic, readers[channel_id], log_times, messages)
-                        tables[topic].append(table)
+                        of_type, get = readers[channel_id]
+                        rows = [
+                            get(_decoded(file, topic, of_type, each, log_time))
+                            for log_time, each in zip(log_times, messages, strict=True)
+                        ]
+                        tables[topic].append(np.array(rows, float))
                         continue
                     try:
                         if topic not in wires:
@@ -382,39 +382,29 @@ def _message_type(file: pathlib.Path, channel: Channel, contents: Contents) -> M
         ) from error
 
 
-def _field_reader(
+def _reader(
     file: pathlib.Path, channel: Channel, contents: Contents, paths: Sequence[str]
-) -> FieldReader:
-    of_type = _message_type(file, channel, contents)
+) -> tuple[MessageType, Callable[[Any], tuple[Any, ...]]]:
+    """Return message type and getter of the numbers of a channel."""
+    of_type, get = _message_type(file, channel, contents), field_getter(paths)
     try:
-        return FieldReader(of_type, paths)
-    except Exception as error:  # no such field, or a type that contains itself
+        np.array(get(of_type.blank()), float)
+    except Exception as error:  # no such field, no number, or a type that contains itself
         raise BagError(
             f'{file}: topic {channel.topic}: message type {of_type.name}: {error}'
         ) from error
+    return of_type, get
 
 
-def _table(
-    file: pathlib.Path,
-    topic: str,
-    read: FieldReader,
-    log_times: Sequence[int],
-    messages: Sequence[bytes],
-) -> np.ndarray:
-    """Return the numbers of some messages; an error names the first that cannot be read."""
+def _decoded(
+    file: pathlib.Path, topic: str, of_type: MessageType, data: bytes, log_time: int
+) -> Any:
     try:
-        return read.table(messages)
-    except BadMessage:
-        for log_time, message in zip(log_times, messages, strict=True):
-            try:
-                read(message)
-            except BadMessage as error:
-                raise _bad(file, topic, log_time, error) from error
-        raise
-
-
-def _bad(file: pathlib.Path, topic: str, log_time: int, error: Exception) -> BagError:
-    return BagError(f'{file}: a message on {topic} at {log_time} ns cannot be decoded: {error}')
+        return of_type.decode(data)
+    except Exception as error:  # invalid bytes can raise any exception
+        raise BagError(
+            f'{file}: a message on {topic} at {log_time} ns cannot be decoded: {error}'
+        ) from error
 
 
 __all__ = ['BagReader']

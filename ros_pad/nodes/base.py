@@ -19,8 +19,7 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
 
 from ros_pad.bags import topics
-from ros_pad.bags.codec import message_type
-from ros_pad.bags.fields import FieldReader, FieldWriter
+from ros_pad.bags.codec import field_getter, message_type, put_field
 from ros_pad.bags.topics import Topic
 from ros_pad.bags.wire import Wire
 from ros_pad.nodes.parameters import Parameter, declare
@@ -108,13 +107,20 @@ class PadNode(Node):
     ) -> Callable[..., None]:
         """Return a function that sends a message with these numbers, in the order of `paths`.
 
-        The frame is that of the table of topics, other fields are zero; see
-        :class:`ros_pad.bags.fields.FieldWriter`.
+        The frame is that of the table of topics, other fields are zero.
         """
-        publish = publisher(self, topic, leg).publish
+        publish, of_type = publisher(self, topic, leg).publish, message_type(topic.type_name)
+        message = of_type.blank()
         frame = {topics.FRAME: topic.frame.format(leg=leg)} if topic.frame else {}
-        write = FieldWriter(message_type(topic.type_name), paths, frame | dict(constants or {}))
-        return lambda *values: publish(write(*values))
+        for path, value in (frame | dict(constants or {})).items():
+            put_field(message, path, value)
+
+        def send(*values: float) -> None:
+            for path, value in zip(paths, values, strict=True):
+                put_field(message, path, value)
+            publish(of_type.encode(message))
+
+        return send
 
     def record_output(
         self, topic: Topic, legs: Sequence[int], fields: Sequence[str] | None = None
@@ -140,8 +146,8 @@ class PadNode(Node):
     ) -> None:
         """Call a function with some fields of each message; without paths, with the message."""
         if paths:
-            read = FieldReader(message_type(topic.type_name), paths)
-            self._receive(topic, leg, read, lambda values: callback(*values))
+            get, decode = field_getter(paths), message_type(topic.type_name).decode
+            self._receive(topic, leg, decode, lambda message: callback(*get(message)))
         else:
             kind = message_class(topic.type_name)
             self._receive(topic, leg, lambda data: deserialize_message(data, kind), callback)

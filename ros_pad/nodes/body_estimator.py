@@ -75,7 +75,6 @@ PARAMETERS = (
 )
 
 _ABSENT = ('angular_velocity_covariance[0]', 'linear_acceleration_covariance[0]')
-_MATRIX = [f'covariance[{place}]' for place in range(36)]
 _TWIST = [f'twist.{part}.{axis}' for part in ('linear', 'angular') for axis in 'xyz']
 
 
@@ -164,8 +163,8 @@ class BodyEstimatorNode(PadNode):
 
     def _advertise(self, base: str, publish_tf: bool) -> None:
         """Create the publishers of odom and of the transform from odom to the base."""
-        pose, twist = ([f'{part}.{place}' for place in _MATRIX] for part in ('pose', 'twist'))
-        paths = [*STAMP, *topics.ODOM.values, *pose, *(f'twist.{each}' for each in _TWIST), *twist]
+        twist = (*(f'twist.{each}' for each in _TWIST), 'twist.covariance')
+        paths = (*STAMP, *topics.ODOM.values, 'pose.covariance', *twist)
         self._send_odom = self.sender(topics.ODOM, paths, constants={'child_frame_id': base})
         self._send_tf: Callable[[int, BodyEstimate], None] | None = None
         if not publish_tf:
@@ -239,11 +238,10 @@ class BodyEstimatorNode(PadNode):
         """Publish an estimate of the body, and collect what it shows of the feet."""
         estimate = estimate._replace(doubt=estimate.doubt or self._lasting)
         values = [*split(stamp_ns), *estimate.position.tolist(), *estimate.orientation.tolist()]
-        values += estimate.covariance[:6, :6].ravel().tolist()
         rate = self._robot.imu[:3, :3] @ self._rate
         velocity, covariance = twist_of(estimate, rate, self.values['gyro_noise'])
-        values += (*velocity.tolist(), *covariance.ravel().tolist())
-        self._send_odom(*values)
+        matrices = estimate.covariance[:6, :6].ravel(), covariance.ravel()
+        self._send_odom(*values, matrices[0], *velocity.tolist(), matrices[1])
         if self._send_tf:
             self._send_tf(stamp_ns, estimate)
         self._samples.add(stamp_ns, sample_of(estimate))

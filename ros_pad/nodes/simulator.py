@@ -144,10 +144,8 @@ class SimulatorNode(PadNode):
         if self.values['publish_clock']:
             outputs['clock'] = self.sender(topics.CLOCK, topics.CLOCK.values)
         if joints:
-            angles = [f'{part}[{place}]' for part in parts for place in range(len(joints))]
-            constants = {'name': joints} | {part: [0.0] * len(joints) for part in parts}
             outputs['joints'] = self.sender(
-                topics.JOINT_STATES, (*STAMP, *angles), constants=constants
+                topics.JOINT_STATES, (*STAMP, *parts), constants={'name': joints}
             )
         if self._body_sensors:
             covariances = {
@@ -229,7 +227,7 @@ class SimulatorNode(PadNode):
         stamps = first_ns + self.period_ns * np.arange(samples)
         rows = SAMPLE.rows(samples, len(self.scene.legs))
         # Forces go first: a reading of the joints waits for them only until the next one.
-        later: list[tuple[str, tuple[float, ...]]] = []
+        later: list[tuple[str, tuple[Any, ...]]] = []
         count = 0
         for row, stamp_ns in zip(rows, stamps.tolist(), strict=True):
             count += 1
@@ -247,14 +245,14 @@ class SimulatorNode(PadNode):
         for name, values in later:
             self._outputs[name](*values)
         if self.robot.joint_names and not self._body_sensors:
-            self._outputs['joints'](*split(self._last_ns), *self.robot.joint_positions)
+            self._outputs['joints'](*split(self._last_ns), self.robot.joint_positions)
         if self._markers_pace.due(self._last_ns):
             array = self._markers.message(self.robot, self.pressures, self._last_ns)
             self._outputs['markers'](ARRAY.encode(array))
         return count
 
     def _sense(
-        self, stamp: tuple[int, int], later: list[tuple[str, tuple[float, ...]]]
+        self, stamp: tuple[int, int], later: list[tuple[str, tuple[Any, ...]]]
     ) -> np.ndarray:
         """Return readings of the feet; add those of IMU and joints."""
         if not self._body_sensors:
@@ -262,7 +260,7 @@ class SimulatorNode(PadNode):
         assert isinstance(self.robot, FullRobot)
         reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
         later.append(('imu', (*stamp, *reading.imu.ravel().tolist())))
-        later.append(('joints', (*stamp, *reading.joints.ravel().tolist())))
+        later.append(('joints', (*stamp, *reading.joints)))
         return reading.rows
 
     def tick(self, samples: int = 1) -> None:

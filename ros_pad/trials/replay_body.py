@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ros_pad.bags import BagReader
-from ros_pad.bags.fields import field_of
+from ros_pad.bags.codec import field_getter
 from ros_pad.bags.topics import FORCE, IMU, JOINT_STATES, ODOM, SAMPLE, STAMP
 from ros_pad.errors import ConfigError, InvalidInput, reason
 from ros_pad.records import SAMPLE as SAMPLES
@@ -92,6 +92,7 @@ def _play(
         poses.append((stamp_ns, Block.of(stamp_ns, pose)))
         feet.append((stamp_ns, Block.of(stamp_ns, sample_of(estimate))))
 
+    imu_numbers = field_getter(IMU.values)
     stage = SensingStage(
         robot, estimator_of(robot, values), take, lambda doubt: None, lambda error: None,
         values['forces'],
@@ -110,7 +111,7 @@ def _play(
                 if math.isfinite(each.sum()):
                     stage.force(index, stamp_ns, each)
         else:
-            numbers = [field_of(content, path) for path in IMU.values]
+            numbers = list(imu_numbers(content))
             if math.isfinite(sum(numbers)):
                 stage.imu(stamp_ns, numbers[:3], numbers[3:])
     if not stage.samples:

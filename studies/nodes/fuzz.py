@@ -12,7 +12,6 @@ atheris.
 
 from __future__ import annotations
 
-import array
 import contextlib
 import dataclasses
 import functools
@@ -26,7 +25,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from ros_pad.errors import BadMessage, PadError, UnknownEncoding
+from ros_pad.errors import BadMessage, PadError
 from studies import command
 
 WATCHED = (
@@ -211,68 +210,6 @@ def _bags() -> Target:
     return Target(_file(_read_bag, 'bag.mcap'), [_bag(), _bag(chunked=False)])
 
 
-def _fields() -> Target:
-    """Return a target that reads messages; the first byte of the data picks the type."""
-    from rosbags.typesys import Stores, get_typestore
-
-    from ros_pad.bags import topics
-    from ros_pad.bags.codec import MessageType
-
-    with _watched_imports():
-        from ros_pad.bags.fields import FieldReader
-
-    store = get_typestore(Stores.ROS2_JAZZY)
-    schema = (each for each in vars(topics).values() if isinstance(each, topics.Topic))
-    readers: list[tuple[FieldReader, FieldReader]] = []
-    seeds = []
-    for topic in {each.type_name: each for each in schema}.values():
-        message_type = MessageType(
-            topic.type_name, store.generate_msgdef(topic.type_name, ros_version=2)[0]
-        )
-        message = message_type.blank()
-        numbers = () if topic.text else topic.values
-        texts = topic.values if topic.text else ()
-        if hasattr(message, 'header'):
-            numbers, texts = (*topics.STAMP, *numbers), (topics.FRAME,)
-            message.header.frame_id = 'leg_1'
-        try:
-            pair = (
-                FieldReader(message_type, (*numbers, *texts)),
-                FieldReader(message_type, numbers),
-            )
-        except UnknownEncoding:
-            continue  # a type with lists
-        for little_endian in (True, False):
-            data = store.serialize_cdr(message, topic.type_name, little_endian=little_endian)
-            seeds.append(bytes([len(readers)]) + bytes(data))
-        readers.append(pair)
-
-    def values(read: Callable[[Any], Any], data: Any) -> Any:
-        try:
-            return read(data)
-        except BadMessage:  # or UnknownEncoding
-            return None
-        except PadError as error:
-            raise AssertionError('bytes of a message raise nothing but BadMessage') from error
-
-    def feed(data: bytes) -> None:
-        read, read_numbers = readers[data[0] % len(readers) if data else 0]
-        message = data[1:]
-        row = values(read_numbers, message)
-        numbers = b'' if row is None else array.array('d', row).tobytes()
-        for messages in ([message] * 2, [message, message + b'\0']):
-            table = values(read_numbers.table, messages)
-            if (table is None) != (row is None) or (row and table.tobytes() != numbers * 2):
-                raise AssertionError(f'{row}, but {table} in a table')
-        every = values(read, message)
-        if every is None:
-            raise BadMessage('refused, as it should be')
-        if row is None or array.array('d', every[: len(row)]).tobytes() != numbers:
-            raise AssertionError(f'{row}, but {every} with the text')
-
-    return Target(feed, seeds)
-
-
 def _records() -> Target:
     """Return a target that reads records of two legs; the first byte picks the kind."""
     import numpy as np
@@ -313,7 +250,6 @@ TARGETS: dict[str, Callable[[], Target]] = {
     'faults': _faults,
     'scenes': _scenes,
     'bags': _bags,
-    'fields': _fields,
     'records': _records,
 }
 """Functions that make the targets, by name."""

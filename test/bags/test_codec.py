@@ -69,3 +69,18 @@ def test_both_byte_orders_are_read():
 def test_a_definition_that_makes_no_sense_is_an_error(definition):
     with pytest.raises(Exception, match=r'.'):  # of any type
         codec.MessageType('test_msgs/msg/Wrong', definition)
+
+
+def test_fields_are_put_and_read_by_their_paths():
+    message_type = codec.message_type('geometry_msgs/msg/TwistWithCovarianceStamped')
+    values = {
+        'header.frame_id': 'odom', 'twist.covariance': range(36), 'twist.covariance[7]': 0.5,
+        'twist.twist.linear.y': -2.0,
+    }  # fmt: skip
+    message = message_type.blank()
+    for path, value in values.items():
+        codec.put_field(message, path, value)
+    read = message_type.decode(message_type.encode(message))
+    paths = ('twist.covariance[7]', 'header.frame_id', 'twist.twist.linear.y')
+    assert codec.field_getter(paths)(read) == (0.5, 'odom', -2.0)
+    assert read.twist.covariance[35] == 35.0

@@ -79,8 +79,8 @@ WHOLE = serialize_message(wrench(1, frame='leg_1_sole'))
     ('data', 'reason'),
     [
         (b'\0\7\0\0' + WHOLE[4:], 'encapsulation 0007 is not'),
-        (WHOLE[:-1], f'{len(WHOLE) - 1} bytes are too few'),
-        (WHOLE[:12] + struct.pack('<I', 4000) + WHOLE[16:], 'too few for a text of 4000 bytes'),
+        (WHOLE[:-1], 'requires a buffer of at least'),
+        (WHOLE[:12] + struct.pack('<I', 4000) + WHOLE[16:], 'string length 4000'),
     ],
     ids=['CDR2', 'cut', 'long frame'],
 )

@@ -13,8 +13,7 @@ import yaml
 
 from ros_pad import configuration
 from ros_pad.bags import BagReader, BagWriter, annotate, topics
-from ros_pad.bags.codec import message_type
-from ros_pad.bags.fields import FieldWriter
+from ros_pad.bags.codec import message_type, put_field
 from ros_pad.bags.wire import Wire, legs_of
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.estimation import doubt as doubts
@@ -68,10 +67,13 @@ def of_legs(name, data):
         if topic.record is kind:
             places = [kind.columns.index(each) for each in topic.columns]
             paths = (*topics.STAMP, *topic.values)
-            write = FieldWriter(type_of(topic.type_name), paths)
+            message = type_of(topic.type_name).blank()
             for leg, row in zip(legs, numbers, strict=True):
                 values = topics.from_record(topic, row[places], 101325.0).tolist()
-                yield f'/{topic.name(leg)}', topic.type_name, write(*divmod(stamp, 10**9), *values)
+                for path, value in zip(paths, (*divmod(stamp, 10**9), *values), strict=True):
+                    put_field(message, path, value)
+                data = type_of(topic.type_name).encode(message)
+                yield f'/{topic.name(leg)}', topic.type_name, data
 
 
 def copy(
