@@ -32,8 +32,6 @@ from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.contact.pad import Array, Pad, need_stiffness
 from ros_pad.errors import InvalidInput, NoSurface
 
-STEEPEST = math.pi - 0.02  # inclination at which the integration of the wet wall stops, rad
-
 
 @dataclass(frozen=True)
 class WetPad:
@@ -199,7 +197,7 @@ def _meridian(case: _Case, b: float, length: float, tension: float, weight: floa
     """Integrate the wall from the contact disc upwards, with the same tension everywhere."""
 
     def steep(s: float, state: Array, *_: float) -> float:
-        return float(state[2]) - STEEPEST
+        return float(state[2]) - (math.pi - 0.02)
 
     steep.terminal = True  # type: ignore[attr-defined]
     disc = b, 0.0, 0.0, math.pi * b * b, 0.0

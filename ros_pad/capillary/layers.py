@@ -42,7 +42,6 @@ _STEEP = math.radians(70.0)  # inclination from which a wall is steep
 _STRAIGHT = math.radians(10.0)  # a straight wall changes its inclination by less than this
 WIDEST_GAP = 0.7  # capillary lengths; between pads farther apart the surface is not level
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-_THROUGH_WALL = 0.01  # of the height: allowed depth of an arc inside a faceted wall
 _ROUND = 720  # pieces of a contact line, for projections
 
 
@@ -362,7 +361,8 @@ def _climb(
     top = _Arc(heights[:, None], radii[:, None], angles[:, None], liquid.angle)
     for j in np.flatnonzero(status == 'ok'):
         wall = np.interp(top.z[j, 0], z, r[j])
-        through = (top.r[j, 0] < wall - _THROUGH_WALL * heights[j]).any()
+        # Walls are faceted: an arc may be slightly inside.
+        through = (top.r[j, 0] < wall - 0.01 * heights[j]).any()
         if through or not top.open[j, 0]:
             status[j] = 'no_circle'
     if strict:

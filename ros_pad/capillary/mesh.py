@@ -24,10 +24,6 @@ from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, MeshError
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
-LARGEST = 0.5  # m: a larger pad is probably given in millimetres
-SMALLEST = 1e-5  # m
-_ON_FLOOR = 1e-5  # of the height: allowed distance from the floor, for files in single precision
-_WELD = 1e-7  # of the extent: points closer than this are merged
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +64,10 @@ class Mesh:
         _check_arrays(points, faces, self.source)
         points, faces = points.astype(np.float64), faces.astype(np.int64)
         extent = float(np.ptp(points[faces.ravel()], axis=0).max())
-        if not SMALLEST <= extent <= LARGEST:
+        if not 1e-5 <= extent <= 0.5:
             raise MeshError(
-                f'{self.source}: the extent is {extent:.6g} m: {SMALLEST:g} to {LARGEST:g} m is'
-                ' needed; a file in millimetres needs scale=1e-3'
+                f'{self.source}: the extent is {extent:.6g} m: 1e-05 to 0.5 m is needed; a file in'
+                ' millimetres needs scale=1e-3'
             )
         used, first = np.unique(faces, return_inverse=True)
         points, faces = points[used], first.reshape(faces.shape)
@@ -79,7 +75,7 @@ class Mesh:
         bodies = _bodies(beside, len(faces))
         _check_volumes(points, faces, bodies, self.source)
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
-        if abs(low) > _ON_FLOOR * (high - low):
+        if abs(low) > 1e-5 * (high - low):  # files can be in single precision
             raise MeshError(
                 f'{self.source}: the lowest point is at z = {low:.6g} m, but z = 0 is needed:'
                 f' use lift = {-low:.9g} m'
@@ -460,9 +456,8 @@ def _welded(points: Array, faces: Indices) -> tuple[Array, Indices]:
     """Merge points that coincide, as in STL files; drop triangles with two equal corners."""
     points, which = np.unique(points, axis=0, return_inverse=True)
     which = which.ravel()
-    pairs = cKDTree(points).query_pairs(
-        _WELD * float(np.ptp(points, axis=0).max()), output_type='ndarray'
-    )
+    apart = 1e-7 * float(np.ptp(points, axis=0).max())
+    pairs = cKDTree(points).query_pairs(apart, output_type='ndarray')
     if len(pairs):
         graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
         count, group = connected_components(graph, directed=False)

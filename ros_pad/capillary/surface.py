@@ -35,7 +35,6 @@ from ros_pad.errors import InvalidInput, MeshError, NoSurface
 
 KNOTS = 129  # number of points of a rail
 REACH = 8.0  # capillary lengths from a pad to where a bath ends, with an error of exp(-2 REACH)
-THINNEST = 0.01  # quality of a triangle (1: equilateral) below which the surface has pinched off
 
 # Radii and heights of a wall, (azimuths, KNOTS, 2), from the floor up at equal steps.
 Rails: TypeAlias = Callable[[Array], Array]
@@ -524,7 +523,7 @@ class _Energy:
         quality = 2.0 * math.sqrt(3.0) * np.linalg.norm(across, axis=1)
         quality /= np.sum(sides**2, axis=(1, 2))
         turned = np.sum(_unit(across) * before, axis=1) < -0.5
-        if not quality.min() > THINNEST or turned.any():
+        if not quality.min() > 0.01 or turned.any():  # equilateral triangles have 1
             raise NoSurface('the surface collapses: it pinches off or turns over', 'collapsed')
         if not 0.0 <= places.min() <= places.max() <= 1.0:
             raise NoSurface('the contact line reaches the end of the wall', 'rim')
