@@ -86,19 +86,12 @@ class Wall:
             When a value is not finite or out of range.
         """
         size = number('sphere_radius', sphere_radius, 'm', above=True)
-        rest = number('contact_radius', contact_radius, 'm', high=size, above=True)
-        start = math.asin(rest / size)
-        if start > 0.5 * math.pi - 1e-9:
-            raise InvalidInput(
-                f'contact_radius = {rest:g} m is not allowed: above 0 and below sphere_radius ='
-                f' {size:g} m is needed'
-            )
-        end = math.pi - 1e-6
+        below = math.nextafter(size, 0.0)
+        start = math.asin(number('contact_radius', contact_radius, 'm', 0.0, below, True) / size)
+        end, most = math.pi - 1e-6, size * (1.0 + math.cos(start))
         if height != math.inf:
-            most = size * (1.0 + math.cos(start))
-            end = math.acos(
-                math.cos(start) - number('height', height, 'm', 0.0, most, True) / size
-            )
+            up = number('height', height, 'm', 0.0, most, True)
+            end = math.acos(math.cos(start) - up / size)
 
         def meridian(phi: float) -> tuple[float, float, float]:
             rise = 2.0 * math.sin(0.5 * (phi + start)) * math.sin(0.5 * (phi - start))
@@ -139,11 +132,8 @@ class Wall:
         rest = number('contact_radius', contact_radius, 'm', above=True)
         phi = number('inclination', inclination, 'rad', 0.01, math.pi - 0.01)
         lean = math.cos(phi) / math.sin(phi)
-        up, down = math.inf, math.inf
-        if height != math.inf:
-            up = number('height', height, 'm', above=True)
-        if depth != math.inf:
-            down = number('depth', depth, 'm')
+        up = height if height == math.inf else number('height', height, 'm', above=True)
+        down = depth if depth == math.inf else number('depth', depth, 'm')
         tip = (1.0 - 1e-6) * rest / abs(lean) if lean else math.inf
         up, down = (min(up, tip), down) if lean < 0 else (up, min(down, tip))
         return cls(lambda z: (rest + lean * z, z, phi), 0.0, up, -down)
@@ -195,15 +185,11 @@ class Wall:
         """
         r = quantity('radii', radii, 'm', above=True)
         z = quantity('heights', heights, 'm', -math.inf)
-        if r.ndim != 1 or r.shape != z.shape or r.size < 2:
+        shaped = r.ndim == 1 and r.shape == z.shape and r.size > 1
+        if not shaped or not ((np.diff(z) > 0.0).all() and z[0] <= 0.0 < z[-1]):
             raise InvalidInput(
-                f'radii of shape {np.shape(r)} and heights of shape {z.shape} are not allowed:'
-                ' one-dimensional arrays of the same length, at least 2, are needed'
-            )
-        if not (np.isfinite(z).all() and (np.diff(z) > 0.0).all() and z[0] <= 0.0 < z[-1]):
-            raise InvalidInput(
-                f'heights = {z} m are not allowed: finite rising values are needed, the first at'
-                ' most 0, the last above 0'
+                f'radii of shape {np.shape(r)} with heights = {z} m are not allowed: as many'
+                ' rising heights as radii are needed, the first at most 0, the last above 0'
             )
         from scipy.interpolate import Akima1DInterpolator
 
@@ -306,8 +292,7 @@ def bath_meniscus(
     >>> round(1e3 * fibre.height, 3)
     1.839
     """
-    if not isinstance(liquid, Liquid):
-        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    instance('liquid', liquid, Liquid)
     if (wall is None) != (sphere_radius is not None and contact_radius is not None):
         raise InvalidInput(
             f'sphere_radius = {sphere_radius!r} and contact_radius = {contact_radius!r}'
@@ -333,17 +318,8 @@ def bath_meniscus(
         + 2.0 * math.pi * length**2 * radius * math.sin(slope)
         - solid_volume(wall, place)
     )
-    return BathMeniscus(
-        height,
-        radius,
-        slope,
-        -weight * height,
-        weight * volume,
-        volume,
-        radii,
-        heights,
-        status,
-    )
+    pressure, force = -weight * height, weight * volume
+    return BathMeniscus(height, radius, slope, pressure, force, volume, radii, heights, status)
 
 
 def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]:
@@ -471,15 +447,10 @@ def outer_surface(radius: float, slope: float, tolerance: float = 1e-12, points:
             return -math.cos(psi) * pull, rise * pull
 
         ends = math.log(outer), math.log(slope)
-        path = solve_ivp(
-            rates,
-            ends,
-            (distance, outer * k0e(start) / k1e(start)),
-            method='DOP853',
-            rtol=10.0 * tolerance,
-            atol=(tolerance * min(radius, 1.0), tolerance * outer),
-            t_eval=np.linspace(*ends, points),
-        )
+        first = distance, outer * k0e(start) / k1e(start)
+        steps = np.linspace(*ends, points)
+        least = tolerance * min(radius, 1.0), tolerance * outer
+        path = solve_ivp(rates, ends, first, 'DOP853', steps, rtol=10.0 * tolerance, atol=least)
         return np.vstack([path.t, path.y])
 
     # The slope decays at least as fast as exp(-2/3 distance), so 25 is far enough.
@@ -507,14 +478,11 @@ def _held(wall: Wall, end: float, length: float, most: float) -> float:
     from scipy.optimize import brentq
 
     radius, height, _ = wall.meridian(end)
-    return float(
-        brentq(
-            lambda slope: bath_height(radius / length, slope, FINE) - height / length,
-            1e-9 * most,
-            most,
-            xtol=1e-12,
-        )
-    )
+
+    def excess(slope: float) -> float:
+        return bath_height(radius / length, slope) - height / length
+
+    return float(brentq(excess, 1e-9 * most, most, xtol=1e-12))
 
 
 def _clear_of(wall: Wall, place: float, radii: Array, heights: Array) -> None:

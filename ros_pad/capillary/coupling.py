@@ -26,13 +26,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ros_pad.capillary.bath import Wall, bath_height, contact
-from ros_pad.configuration import number
+from ros_pad.configuration import instance, number
 from ros_pad.contact.dome import press
 from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.contact.pad import Array, Pad, need_stiffness
 from ros_pad.errors import InvalidInput, NoSurface
-
-STEEPEST = math.pi - 0.02  # inclination at which the integration of the wet wall stops, rad
 
 
 @dataclass(frozen=True)
@@ -126,8 +124,7 @@ def press_wet(
     >>> f'{100 * (found.gap / found.rigid.gap - 1):.2f} %'
     '-0.06 %'
     """
-    if not isinstance(liquid, Liquid):
-        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    instance('liquid', liquid, Liquid)
     need_stiffness('a pad in a bath', pad)
     p = number('pressure', pressure, 'Pa', above=True)
     load = number('force', force, 'N', above=True)
@@ -150,7 +147,7 @@ def press_wet(
             f'contact_angle = {case.angle:g} rad is not allowed: below pi rad is needed'
         )
     _refuse_rim(place, dry[2])
-    rigid = _result(pad, case, (*dry, place), slope, rigid_wall, rigid_wall, 0.0, None)
+    rigid = _result(pad, case, (*dry, place), slope, rigid_wall, rigid_wall)
 
     found = _root(lambda x: _misfit(case, x), (*dry, place), 'pad and liquid')
     _refuse_rim(found[3], found[2])
@@ -192,57 +189,35 @@ Meridian: TypeAlias = Any
 def _rates(s: float, state: Array, push: float, weight: float, tension: float) -> list[float]:
     r, z, phi = state[:3]
     sine = math.sin(phi)
-    return [
-        math.cos(phi),
-        sine,
-        (push + weight * z) / tension - sine / r,
-        2.0 * math.pi * r,
-        math.pi * r * r * sine,
-    ]
+    bend = (push + weight * z) / tension - sine / r
+    return [math.cos(phi), sine, bend, 2.0 * math.pi * r, math.pi * r * r * sine]
 
 
 def _meridian(case: _Case, b: float, length: float, tension: float, weight: float) -> Meridian:
     """Integrate the wall from the contact disc upwards, with the same tension everywhere."""
-    from scipy.integrate import solve_ivp
 
     def steep(s: float, state: Array, *_: float) -> float:
-        return float(state[2]) - STEEPEST
+        return float(state[2]) - (math.pi - 0.02)
 
     steep.terminal = True  # type: ignore[attr-defined]
-    path = solve_ivp(
-        _rates,
-        (0.0, 2.0 * length + 1.0),
-        (b, 0.0, 0.0, math.pi * b * b, 0.0),
-        method='DOP853',
-        rtol=1e-11,
-        atol=1e-13,
-        dense_output=True,
-        events=steep,
-        args=(case.pressure, weight, tension),
-    )
-    meridian: Meridian = path.sol
-    return meridian
+    disc = b, 0.0, 0.0, math.pi * b * b, 0.0
+    return _integrated((0.0, 2.0 * length + 1.0), disc, (case.pressure, weight, tension), steep)
 
 
 def _above(case: _Case, unknowns: Any, wet: Meridian, kink: float) -> Meridian:
     """Return the dry wall above the contact line, over arc length from the disc."""
-    from scipy.integrate import solve_ivp
-
     _, tension, length, place = unknowns
     state = np.array(wet(place))
     state[2] += kink
-    path = solve_ivp(
-        _rates,
-        (place, length),
-        state,
-        method='DOP853',
-        rtol=1e-11,
-        atol=1e-13,
-        dense_output=True,
-        args=(case.pressure, 0.0, tension),
-    )
-    meridian: Meridian = path.sol
-    return meridian
+    return _integrated((place, length), state, (case.pressure, 0.0, tension))
+
+
+def _integrated(span: Any, start: Any, given: tuple[float, float, float], *ends: Any) -> Meridian:
+    from scipy.integrate import solve_ivp
+
+    tight = {'rtol': 1e-11, 'atol': 1e-13}
+    path = solve_ivp(_rates, span, start, 'DOP853', None, True, ends, args=given, **tight)
+    return path.sol
 
 
 def _as_wall(meridian: Any) -> Wall:
@@ -281,9 +256,8 @@ def _joint(case: _Case, tension: float, phi: float) -> tuple[float, float]:
     cosine = (wet * wet + liquid * liquid - tension * tension) / (2.0 * wet * liquid)
     if wet <= 0.0 or abs(cosine) > 1.0:
         raise NoSurface(
-            f'a surface tension of {liquid:.3g} times the stiffness is too large for a membrane'
-            f' tension of {tension:.3g} times the stiffness: the tensions at the contact line'
-            ' cannot balance',
+            f'the surface tension, {liquid:.3g} times the stiffness, is too large for a membrane'
+            f' tension of {tension:.3g} times the stiffness',
             'no_convergence',
         )
     slope = math.acos(cosine) - phi
@@ -304,11 +278,7 @@ def _misfit(case: _Case, x: Array) -> list[float]:
     """Return the residuals of the four equations."""
     b, tension, length, place = x
     if not (0.0 < b < 1.0 and tension > case.grip and 0.0 < place < length):
-        raise NoSurface(
-            'no equilibrium of pad and liquid was found: the solver left the possible range of'
-            ' contact radius, tension or contact line',
-            'no_convergence',
-        )
+        raise NoSurface('no equilibrium of pad and liquid was found', 'no_convergence')
     wet = _meridian(case, b, length, tension - case.grip, case.weight)
     line = wet(place)
     slope, kink = _joint(case, tension, float(line[2]))
@@ -335,21 +305,13 @@ def _root(misfit: Callable[[Array], list[float]], start: Any, what: str) -> tupl
 
 def _refuse_rim(place: float, length: float) -> None:
     if place >= length:
-        raise NoSurface(
-            'the liquid reaches the rim of the pad, which this model does not include', 'rim'
-        )
+        raise NoSurface('the liquid reaches the rim of the pad', 'rim')
 
 
 def _result(
-    pad: Pad,
-    case: _Case,
-    unknowns: Any,
-    slope: float,
-    wet: Meridian,
-    above: Meridian,
-    kink: float,
-    rigid: WetPad | None,
-) -> WetPad:
+    pad: Pad, case: _Case, unknowns: Any, slope: float, wet: Meridian, above: Meridian,
+    kink: float = 0.0, rigid: WetPad | None = None,
+) -> WetPad:  # fmt: skip
     b, tension, length, place = unknowns
     size = pad.radius
     line = wet(place)

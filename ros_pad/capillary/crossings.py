@@ -20,8 +20,6 @@ from ros_pad.contact.pad import Array
 Indices: TypeAlias = npt.NDArray[np.int64]
 
 ROUNDING = 5e-7  # of the largest coordinate: more than single precision and welding shift corners
-_AT_ONCE = 1 << 18  # pairs of nodes tested together: limits the memory
-_SAMPLES = 200  # points of a body that are tested against another one
 
 
 class Overlap(NamedTuple):
@@ -93,7 +91,7 @@ def _nested(corners: Array, bodies: Indices, slack: float) -> Overlap | None:
         meets[body] = False
         if not meets.any():
             continue
-        mine = mine[:: max(1, len(mine) // _SAMPLES)]
+        mine = mine[:: max(1, len(mine) // 200)]
         a, b, c = np.moveaxis(corners[mine], 1, 0)
         normal = np.cross(b - a, c - a)
         size = np.linalg.norm(normal, axis=1)
@@ -191,7 +189,7 @@ def _near(
     waiting = [(0, a, b)]
     while waiting:
         level, a, b = waiting.pop()
-        if a.size > _AT_ONCE:
+        if a.size > 1 << 18:  # limits the memory
             half = a.size // 2
             waiting += [(level, a[:half], b[:half]), (level, a[half:], b[half:])]
         elif level == depth:

@@ -29,7 +29,7 @@ import numpy.typing as npt
 
 from ros_pad.capillary.mesh import Indices, Mesh
 from ros_pad.capillary.sections import Layers, Walls, centre, layered, walls
-from ros_pad.configuration import choice, integer, number
+from ros_pad.configuration import choice, instance, integer, number
 from ros_pad.contact.meniscus import GRAVITY, Liquid, hysteresis_force
 from ros_pad.contact.pad import Array, Floats
 from ros_pad.errors import InvalidInput, MeshError
@@ -42,7 +42,6 @@ _STEEP = math.radians(70.0)  # inclination from which a wall is steep
 _STRAIGHT = math.radians(10.0)  # a straight wall changes its inclination by less than this
 WIDEST_GAP = 0.7  # capillary lengths; between pads farther apart the surface is not level
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-_THROUGH_WALL = 0.01  # of the height: allowed depth of an arc inside a faceted wall
 _ROUND = 720  # pieces of a contact line, for projections
 
 
@@ -76,8 +75,6 @@ class Wet:
         ``ok`` or the reason why there is no result.
     axis : tuple of float
         x and y of the axis, m.
-    top : float
-        Height of the mesh, m.
     balance : str
         One of ``BALANCES``.
     liquid : Liquid
@@ -92,7 +89,6 @@ class Wet:
     pressure: Array
     status: npt.NDArray[np.str_]
     axis: tuple[float, float]
-    top: float
     balance: str
     liquid: Liquid
 
@@ -106,15 +102,15 @@ class Wet:
         """Difference between the highest and the lowest slice, m; NaN if one has no result."""
         return float(np.ptp(self.heights))
 
-    def section(self, direction: float | npt.ArrayLike) -> float:
+    def section(self, direction: float) -> float:
         """Return the liquid's area projected along a direction of motion, m².
 
         NaN if a slice has no result.
 
         Parameters
         ----------
-        direction : float or array of 2 or 3 numbers
-            Azimuth, rad from the x axis, or a vector, whose vertical part is ignored.
+        direction : float
+            Azimuth of the motion, rad from the x axis.
 
         Returns
         -------
@@ -124,12 +120,11 @@ class Wet:
         Raises
         ------
         InvalidInput
-            When the direction is not finite, has another shape, or is a vector without horizontal
-            part.
+            When the direction is not finite.
         """
         return self._projected(direction, np.ones_like(self.heights))
 
-    def force(self, direction: float | npt.ArrayLike) -> float:
+    def force(self, direction: float) -> float:
         """Return pressure times section for a direction of motion (thesis 4.18).
 
         This is the thesis' estimate of the force on one side of the pad. It is not a bound,
@@ -138,8 +133,8 @@ class Wet:
 
         Parameters
         ----------
-        direction : float or array of 2 or 3 numbers
-            Azimuth, rad, or a vector, as for :meth:`section`.
+        direction : float
+            Azimuth of the motion, rad from the x axis.
 
         Returns
         -------
@@ -154,7 +149,7 @@ class Wet:
         return self._projected(direction, self.pressure)
 
     def hysteresis_force(
-        self, direction: float | npt.ArrayLike, advancing_angle: float, receding_angle: float
+        self, direction: float, advancing_angle: float, receding_angle: float
     ) -> float:
         """Return the largest force of the pinned contact line against a motion.
 
@@ -163,8 +158,8 @@ class Wet:
 
         Parameters
         ----------
-        direction : float or array of 2 or 3 numbers
-            Azimuth, rad, or a vector, as for :meth:`section`.
+        direction : float
+            Azimuth of the motion, rad from the x axis.
         advancing_angle, receding_angle : float
             Contact angles at which the line starts to move, rad, from 0 to pi; advancing >=
             receding.
@@ -214,14 +209,14 @@ class Wet:
         y = self.axis[1] + r * np.sin(self.azimuths)[:, None]
         return np.stack([x, y, z], axis=2)
 
-    def _across(self, direction: float | npt.ArrayLike) -> Array:
+    def _across(self, direction: float) -> Array:
         """Return the coordinate across a direction along the closed contact line, m."""
-        forward = _azimuth(direction)
+        forward = number('direction', direction, 'rad', low=-math.inf)
         turns = np.linspace(0.0, 2.0 * math.pi, _ROUND + 1)
         radii = np.interp(turns, self.azimuths, self.ring_radii, period=2.0 * math.pi)
         return radii * np.sin(turns - forward)
 
-    def _projected(self, direction: float | npt.ArrayLike, factor: Array) -> float:
+    def _projected(self, direction: float, factor: Array) -> float:
         across = self._across(direction)
         middle = 2.0 * math.pi * (np.arange(_ROUND) + 0.5) / _ROUND
         load = np.interp(middle, self.azimuths, factor * self.heights, period=2.0 * math.pi)
@@ -332,10 +327,11 @@ def wet(
     integer('slices', slices, 3, 3600)
     if axis is None:
         axis = centre(mesh, 0.5 * mesh.height / layers)
-    else:
-        axis = _pair(axis)
-    cut = walls(mesh, layers, slices, axis)
-    return _climb(cut, liquid, balance, axis, strict)
+    if len(axis) != 2:
+        raise InvalidInput(f'axis = {axis!r} is not allowed: x and y, m, are needed')
+    x, y = (number('axis', value, 'm', low=-math.inf) for value in axis)
+    cut = walls(mesh, layers, slices, (x, y))
+    return _climb(cut, liquid, balance, (x, y), strict)
 
 
 def _climb(
@@ -365,7 +361,8 @@ def _climb(
     top = _Arc(heights[:, None], radii[:, None], angles[:, None], liquid.angle)
     for j in np.flatnonzero(status == 'ok'):
         wall = np.interp(top.z[j, 0], z, r[j])
-        through = (top.r[j, 0] < wall - _THROUGH_WALL * heights[j]).any()
+        # Walls are faceted: an arc may be slightly inside.
+        through = (top.r[j, 0] < wall - 0.01 * heights[j]).any()
         if through or not top.open[j, 0]:
             status[j] = 'no_circle'
     if strict:
@@ -384,7 +381,6 @@ def _climb(
         pressure=np.where(good, pressure, np.nan),
         status=status,
         axis=axis,
-        top=float(z[-1]),
         balance=balance,
         liquid=liquid,
     )
@@ -667,35 +663,6 @@ def _between(values: Array, rows: Indices, k: Indices) -> Array:
 
 
 def _check(mesh: Mesh, liquid: Liquid, balance: str) -> None:
-    if not isinstance(mesh, Mesh):
-        raise InvalidInput(f'mesh = {mesh!r} is not allowed: a Mesh is needed')
-    if not isinstance(liquid, Liquid):
-        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    instance('mesh', mesh, Mesh)
+    instance('liquid', liquid, Liquid)
     choice('balance', balance, BALANCES)
-
-
-def _pair(axis: tuple[float, float]) -> tuple[float, float]:
-    if np.shape(axis) != (2,):
-        raise InvalidInput(
-            f'axis = {axis!r} is not allowed: two numbers, x and y in m, are needed'
-        )
-    x, y = (number('axis', value, 'm', low=-math.inf) for value in axis)
-    return x, y
-
-
-def _azimuth(direction: Floats) -> float:
-    """Return the azimuth of a direction, rad."""
-    if np.ndim(direction) == 0:
-        return number('direction', direction, 'rad', low=-math.inf)
-    vector = np.asarray(direction)
-    if vector.shape not in ((2,), (3,)) or vector.dtype.kind not in 'iuf':
-        raise InvalidInput(
-            f'direction = {direction!r} is not allowed: an azimuth in rad, or a vector of 2 or 3'
-            ' numbers, is needed'
-        )
-    if not np.isfinite(vector).all() or not np.hypot(*vector[:2]) > 0.0:
-        raise InvalidInput(
-            f'direction = {direction!r} is not allowed: a finite vector with a horizontal part'
-            ' other than 0 is needed'
-        )
-    return math.atan2(vector[1], vector[0])

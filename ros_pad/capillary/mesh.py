@@ -24,10 +24,6 @@ from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, MeshError
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
-LARGEST = 0.5  # m: a larger pad is probably given in millimetres
-SMALLEST = 1e-5  # m
-_ON_FLOOR = 1e-5  # of the height: allowed distance from the floor, for files in single precision
-_WELD = 1e-7  # of the extent: points closer than this are merged
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,20 +64,29 @@ class Mesh:
         _check_arrays(points, faces, self.source)
         points, faces = points.astype(np.float64), faces.astype(np.int64)
         extent = float(np.ptp(points[faces.ravel()], axis=0).max())
-        _check_size(extent, self.source)
+        if not 1e-5 <= extent <= 0.5:
+            raise MeshError(
+                f'{self.source}: the extent is {extent:.6g} m: 1e-05 to 0.5 m is needed; a file in'
+                ' millimetres needs scale=1e-3'
+            )
         used, first = np.unique(faces, return_inverse=True)
         points, faces = points[used], first.reshape(faces.shape)
         edges, beside = _edges(points, faces, self.source)
         bodies = _bodies(beside, len(faces))
         _check_volumes(points, faces, bodies, self.source)
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
-        if abs(low) > _ON_FLOOR * (high - low):
+        if abs(low) > 1e-5 * (high - low):  # files can be in single precision
             raise MeshError(
                 f'{self.source}: the lowest point is at z = {low:.6g} m, but z = 0 is needed:'
                 f' use lift = {-low:.9g} m'
             )
         points[:, 2] -= low
-        _check_overlaps(points, faces, edges, beside, bodies, self.source)
+        found = first_overlap(points, faces, edges, beside, bodies)
+        if found is not None:
+            one, other = bodies[list(found.faces)]
+            what = 'the mesh cuts itself' if one == other else 'bodies overlap'
+            x, y, z = found.place
+            raise MeshError(f'{self.source}: {what} at ({x:.4g}, {y:.4g}, {z:.4g}) m')
         points.setflags(write=False)
         faces.setflags(write=False)
         object.__setattr__(self, 'points', points)
@@ -451,9 +456,8 @@ def _welded(points: Array, faces: Indices) -> tuple[Array, Indices]:
     """Merge points that coincide, as in STL files; drop triangles with two equal corners."""
     points, which = np.unique(points, axis=0, return_inverse=True)
     which = which.ravel()
-    pairs = cKDTree(points).query_pairs(
-        _WELD * float(np.ptp(points, axis=0).max()), output_type='ndarray'
-    )
+    apart = 1e-7 * float(np.ptp(points, axis=0).max())
+    pairs = cKDTree(points).query_pairs(apart, output_type='ndarray')
     if len(pairs):
         graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
         count, group = connected_components(graph, directed=False)
@@ -469,12 +473,13 @@ def _welded(points: Array, faces: Indices) -> tuple[Array, Indices]:
 
 
 def _check_arrays(points: npt.NDArray[Any], faces: npt.NDArray[Any], source: str) -> None:
-    if points.size == 0 or faces.size == 0:
-        raise MeshError(f'{source}: the mesh has no points or no triangles')
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in 'iuf':
-        raise MeshError(f'{source}: points of shape {points.shape}: (n, 3) numbers are needed')
-    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in 'iu':
-        raise MeshError(f'{source}: faces of shape {faces.shape}: (m, 3) integers are needed')
+    for name, values, kinds in (('points', points, 'iuf'), ('faces', faces, 'iu')):
+        shaped = values.ndim == 2 and values.shape[1] == 3 and values.size
+        if not shaped or values.dtype.kind not in kinds:
+            what = 'integers' if kinds == 'iu' else 'numbers'
+            raise MeshError(
+                f'{source}: {name} of shape {values.shape}: (n, 3) {what}, n from 1, are needed'
+            )
     if faces.min() < 0 or faces.max() >= len(points):
         raise MeshError(
             f'{source}: faces with corners {faces.min()} to {faces.max()} are not allowed:'
@@ -483,19 +488,6 @@ def _check_arrays(points: npt.NDArray[Any], faces: npt.NDArray[Any], source: str
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
         raise MeshError(f'{source}: point {bad[0]} is not finite: {points[bad[0]]}')
-
-
-def _check_size(extent: float, source: str) -> None:
-    if extent > LARGEST:
-        raise MeshError(
-            f'{source}: the extent is {extent:.6g} m: at most {LARGEST:g} m is needed; a file in'
-            ' millimetres needs scale=1e-3'
-        )
-    if extent < SMALLEST:
-        raise MeshError(
-            f'{source}: the extent is {extent:.6g} m: at least {SMALLEST:g} m is needed; check the'
-            ' scale'
-        )
 
 
 def _edges(points: Array, faces: Indices, source: str) -> tuple[Indices, Indices]:
@@ -544,17 +536,6 @@ def _check_volumes(points: Array, faces: Indices, bodies: Indices, source: str) 
             f'{source}: {which} inside out (flipped normals) or flat: use flip=True to reverse the'
             ' whole mesh; cavities inside a pad are not allowed'
         )
-
-
-def _check_overlaps(
-    points: Array, faces: Indices, edges: Indices, beside: Indices, bodies: Indices, source: str
-) -> None:
-    found = first_overlap(points, faces, edges, beside, bodies)
-    if found is not None:
-        one, other = bodies[list(found.faces)]
-        what = 'the mesh cuts itself' if one == other else 'bodies overlap'
-        x, y, z = found.place
-        raise MeshError(f'{source}: {what} at ({x:.4g}, {y:.4g}, {z:.4g}) m')
 
 
 def _tetrahedra(points: Array, faces: Indices) -> Array:

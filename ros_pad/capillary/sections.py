@@ -13,8 +13,7 @@ from ros_pad.capillary.mesh import Indices, Mesh
 from ros_pad.contact.pad import Array
 from ros_pad.errors import MeshError
 
-CREASE = math.radians(40.0)  # facets with a smaller angle between them belong to one smooth wall
-AT_ONCE = 2_000_000  # triangles times layers processed together: limits the memory
+_SMOOTH = math.cos(math.radians(40.0))  # of facets that belong to one wall
 _INSIDE = 1e-9  # of the height: distance of the lowest and highest cut from floor and top
 
 
@@ -198,7 +197,7 @@ def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
     row = np.repeat(np.arange(wanted.size), count)
     within = np.arange(row.size) - np.repeat(np.cumsum(count) - count, count)
     near = order[begin[point][row] + within]
-    alike = np.einsum('ij,ij->i', flat[wanted[row] // 3], flat[near // 3]) > math.cos(CREASE)
+    alike = np.einsum('ij,ij->i', flat[wanted[row] // 3], flat[near // 3]) > _SMOOTH
     alike &= weight.ravel()[near] > 0.0
     share = np.where(alike, weight.ravel()[near], 0.0)
     mean = _units(
@@ -264,7 +263,7 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
     corners = corners[upright]
     normals = _smooth_normals(mesh, upright, np.tile([0, 1, 2], (upright.size, 1)))
     wall = np.concatenate([corners, normals], axis=2)
-    pieces = np.array_split(cuts, min(cuts.size, 1 + len(wall) * cuts.size // AT_ONCE))
+    pieces = np.array_split(cuts, min(cuts.size, 1 + len(wall) * cuts.size // 2_000_000))
     areas, wetted, outline, pull, gain = np.concatenate(
         [_cut_level(wall, piece, angle) for piece in pieces], axis=1
     )

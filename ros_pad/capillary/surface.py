@@ -35,7 +35,6 @@ from ros_pad.errors import InvalidInput, MeshError, NoSurface
 
 KNOTS = 129  # number of points of a rail
 REACH = 8.0  # capillary lengths from a pad to where a bath ends, with an error of exp(-2 REACH)
-THINNEST = 0.01  # quality of a triangle (1: equilateral) below which the surface has pinched off
 
 # Radii and heights of a wall, (azimuths, KNOTS, 2), from the floor up at equal steps.
 Rails: TypeAlias = Callable[[Array], Array]
@@ -121,7 +120,6 @@ def wet_surface(
     area: float | None = None,
     sectors: int = 24,
     refinements: int = 1,
-    square: bool = False,
 ) -> WetSurface:
     """Compute the liquid of least energy around a pad, with its error.
 
@@ -133,15 +131,13 @@ def wet_surface(
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
     area : float, optional
-        Area of one pad of a pattern with the gap around it, m², above 0. Without it the pad stands
-        alone in a wide bath at floor level.
+        Area of one pad of a hexagonal pattern with the gap around it, m², above 0. Without it the
+        pad stands alone in a wide bath at floor level.
     sectors : int
         Number of vertices around the pad before refinement, from 6; of a pattern a multiple of
-        12, of a square one of 8.
+        12.
     refinements : int
         Number of refinements, from 0; each halves the size of the triangles.
-    square : bool
-        The pattern is square instead of hexagonal.
 
     Returns
     -------
@@ -182,7 +178,7 @@ def wet_surface(
     if area is None:
         surface, outer = _in_bath(curves, liquid)
     else:
-        surface, outer = _in_cell(curves, liquid, area, square)
+        surface, outer = _in_cell(curves, liquid, area)
     size = float(np.ptp(surface.points, axis=0).max())
     task = _Task(
         rails=lambda azimuths: rails(azimuths) / size,
@@ -338,13 +334,10 @@ def _in_bath(curves: Array, liquid: Liquid) -> tuple[_Surface, Rails]:
     wall = replace(Wall.through(*mean.T), steps=12)  # coarse: only a start is needed
     bath = bath_meniscus(wall=wall, liquid=liquid)
     if bath.status in ('dry', 'rim'):
-        raise NoSurface(
-            'the liquid is pushed below the floor, where the wall ends'
-            if bath.status == 'dry'
-            else f'the liquid reaches the top of the wall at height = {bath.height:g} m: a taller'
-            ' pad is needed',
-            'rim',
-        )
+        why = 'is pushed below the floor, where the wall ends'
+        if bath.status == 'rim':
+            why = f'reaches the top of the wall at height = {bath.height:g} m'
+        raise NoSurface(f'the liquid {why}', 'rim')
     place = float(np.interp(bath.height, mean[:, 1], np.linspace(0.0, 1.0, KNOTS)))
     length = math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
     far = float(curves[..., 0].max()) + REACH * length
@@ -366,23 +359,16 @@ def _in_bath(curves: Array, liquid: Liquid) -> tuple[_Surface, Rails]:
     return _spanned(np.stack([*bent, outer]), place), lambda azimuths: np.full(azimuths.size, far)
 
 
-def _in_cell(curves: Array, liquid: Liquid, area: float, square: bool) -> tuple[_Surface, Rails]:
-    """Return a cone from the pad to the middle between equal pads."""
-    sides, ratio = (4, 1.0) if square else (6, math.sqrt(0.75))
-    pitch = math.sqrt(number('area', area, 'm²', above=True) / ratio)
-    sectors = len(curves)
-    if sectors % (2 * sides):
+def _in_cell(curves: Array, liquid: Liquid, area: float) -> tuple[_Surface, Rails]:
+    """Return a cone from the pad to the middle between equal pads, a hexagon."""
+    sectors, widest, ratio = len(curves), 2.0 * float(curves[..., 0].max()), math.sqrt(0.75)
+    if sectors % 12:
         raise InvalidInput(
-            f'sectors = {sectors!r} is not allowed: a multiple of {2 * sides} is needed, for'
-            ' vertices in the corners of the cell'
+            f'sectors = {sectors!r} is not allowed: a multiple of 12 is needed, for vertices in'
+            ' the corners of the cell'
         )
-    widest = 2.0 * float(curves[..., 0].max())
-    if widest >= pitch:
-        raise InvalidInput(
-            f'area = {area:g} m² is not allowed: above {ratio * widest**2:g} m² is needed, for a'
-            f' pitch above {widest:g} m, the width of the pads'
-        )
-    turn = 2.0 * math.pi / sides
+    number('area', area, 'm² (pads must not touch)', ratio * widest**2, above=True)
+    pitch, turn = math.sqrt(area / ratio), math.pi / 3.0
 
     def outer(azimuths: Array) -> Array:
         off = np.mod(azimuths + 0.5 * turn, turn) - 0.5 * turn
@@ -537,7 +523,7 @@ class _Energy:
         quality = 2.0 * math.sqrt(3.0) * np.linalg.norm(across, axis=1)
         quality /= np.sum(sides**2, axis=(1, 2))
         turned = np.sum(_unit(across) * before, axis=1) < -0.5
-        if not quality.min() > THINNEST or turned.any():
+        if not quality.min() > 0.01 or turned.any():  # equilateral triangles have 1
             raise NoSurface('the surface collapses: it pinches off or turns over', 'collapsed')
         if not 0.0 <= places.min() <= places.max() <= 1.0:
             raise NoSurface('the contact line reaches the end of the wall', 'rim')

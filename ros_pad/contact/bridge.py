@@ -306,9 +306,8 @@ class _Shape(NamedTuple):
     rise: Array  # derivative of the height over the quadrature variable, at these nodes
 
 
-# Grid of ``place``, and the value of q over sinh(place); see _floor_and_curvature.
+# Grid of ``place``; see _floor_and_curvature.
 _PLACES = np.linspace(-46.0, 105.0, 303)
-_FINEST = 1e-12
 
 
 def _young_laplace(
@@ -425,7 +424,7 @@ def _floor_and_curvature(place: Floats, start: Floats, end: Floats) -> tuple[Arr
     grows from 0 until the neck is too thin.
     """
     spread = 2.0 * np.cos(0.5 * (start + end)) * np.sin(0.5 * (start - end))
-    q = _FINEST * np.sinh(place)
+    q = 1e-12 * np.sinh(place)
     large = np.maximum(0.5 * (abs(q) + np.sqrt(q * q + 4.0 * abs(spread))), 1e-300)
     small = abs(spread) / large
     bend = np.where(end > start, 1.0, -1.0)

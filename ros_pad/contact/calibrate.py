@@ -30,9 +30,6 @@ from ros_pad.contact.pad import Array, MeasuredLimit, Pad, with_constant
 from ros_pad.contact.resistance import LIMIT_SETTINGS, PAD_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
-# Share by which single points may differ in stiffness before a warning says so.
-_TREND = 0.1
-
 # Settings of a foot file for the constants that are checked only after the fit.
 _IN_FOOT = {
     'stiffness': PAD_SETTINGS[1],
@@ -229,7 +226,7 @@ def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[P
         fit = fit_positive(heights, free.height, [value], [least], [math.inf])
         found = fit.constant(name, unit, "of the thesis' law, free domes")
         each = stiffness_of(pad, *free)[np.argsort(free.pressure)]
-        if len(each) > 2 and abs(each[-1] / each[0] - 1.0) > _TREND:
+        if len(each) > 2 and abs(each[-1] / each[0] - 1.0) > 0.1:
             warnings.append(
                 f'one stiffness does not fit all points: single points give {each[0]:.3g} N/m at'
                 f' {free.pressure.min():g} Pa and {each[-1]:.3g} N/m at {free.pressure.max():g} Pa'

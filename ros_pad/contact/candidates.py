@@ -26,9 +26,6 @@ from ros_pad.contact.material import Material
 from ros_pad.contact.pad import MeasuredLimit, Pad, with_constant
 from ros_pad.errors import NoEquilibrium
 
-# Factors over the range of a material.
-_FACTORS = 9
-
 
 class Span(NamedTuple):
     """A value, and its lowest and highest one by the doubts about the material."""
@@ -167,5 +164,5 @@ def _factors(pad: Pad, force: float, ceiling: float, criterion: str) -> list[flo
     kinks = [ceiling / end, force / strongest * (1.0 + 1e-9) if strongest > 0.0 else math.inf]
     low, high = material.factor_range
     inside = [material.factor * each for each in kinks if low < material.factor * each < high]
-    spread = np.linspace(low, high, _FACTORS).tolist() if low < high else []
+    spread = np.linspace(low, high, 9).tolist() if low < high else []
     return [material.factor, *spread, *inside]

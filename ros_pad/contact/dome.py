@@ -25,8 +25,6 @@ MODELS = ('thesis', 'membrane')
 
 # Pressure ``P`` from which on the free dome grows without limit and has no equilibrium.
 BURST = 6.0
-# Largest relative adhesion ``a`` for which the branch structure below was checked.
-LARGEST_ADHESION = 0.01
 
 Codes: TypeAlias = npt.NDArray[np.int8]
 STATUS = np.array(['ok', 'no_contact', 'flattened', 'fold_zone', 'no_inflation', 'out_of_range'])
@@ -302,7 +300,7 @@ def _inflate_caps(pad: Pad, p: Array) -> Solved:
 
 def signed_adhesion(pad: Pad, adhesion: str) -> float:
     """Return the relative adhesion ``a`` of a pad; raise `InvalidInput` above 0.01."""
-    most = LARGEST_ADHESION * pad.stiffness
+    most = 0.01 * pad.stiffness  # up to there the branch structure was checked
     number('adhesion_energy', pad.adhesion_energy, 'J/m²', high=most)
     return ADHESION_SIGNS[adhesion] * pad.adhesion_energy / pad.stiffness
 

@@ -11,12 +11,6 @@ import numpy as np
 
 from ros_pad.contact.pad import Array
 
-CONFIDENCE = 0.95
-# A constant is identified if its interval is within this factor of its value, and if every change
-# of the constants by 1 % changes the modelled data by more than one part in 10^5.
-_WIDEST = 10.0
-_LEAST_EFFECT = 1e-3
-
 
 @dataclass(frozen=True)
 class Constant:
@@ -105,15 +99,17 @@ class Fit:
         return Constant(name, unit, value, low, high, self.points, True, note)
 
     def identified(self) -> bool:
-        """Return whether the data determine each constant separately."""
+        """Return whether the data determine each constant separately.
+
+        Its interval must be within a factor of 10 of its value, and every change of the constants
+        by 1 % must change the modelled data by more than one part in 10^5.
+        """
         if not np.isfinite(self.values).all():
             return False
         singular = np.linalg.svd(self.sensitivity, compute_uv=False)
         known = self.half_widths[~np.isnan(self.half_widths)]
-        return bool(
-            singular[-1] > _LEAST_EFFECT * math.sqrt(self.points)
-            and (known < math.log(_WIDEST)).all()
-        )
+        felt = singular[-1] > 1e-3 * math.sqrt(self.points)
+        return bool(felt and (known < math.log(10.0)).all())
 
 
 def fit_positive(
@@ -159,7 +155,7 @@ def _half_widths(jacobian: Array, residuals: Array) -> Array:
     if spare < 1:
         return np.full(constants, np.nan)
     covariance = residuals @ residuals / spare * np.linalg.pinv(jacobian.T @ jacobian)
-    return np.asarray(student.ppf(0.5 + 0.5 * CONFIDENCE, spare) * np.sqrt(np.diag(covariance)))
+    return np.asarray(student.ppf(0.975, spare) * np.sqrt(np.diag(covariance)))
 
 
 def kept_constant(name: str, unit: str, value: float, note: str) -> Constant:

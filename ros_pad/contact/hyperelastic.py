@@ -51,26 +51,18 @@ from ros_pad.errors import InvalidInput
 
 Law = tuple[str, tuple[float, ...]]
 
-# States integrated together: with more, BLAS would start threads for each step.
-_TOGETHER = 1000
-# Most evaluations of the equations in one integration; usual are 2,000.
-_EVALUATIONS = 20000
 # Relative tolerance of the integration.
 _TOLERANCE = 1e-11
 # The free dome is one with a contact of this radius, relative to μ h/p.
 _POINT = 1e-9
 # Smallest strain of the apex, over the largest, that is computed; below it extrapolation is exact.
 _FLAT = 3e-3
-# Without a maximum of P, the coordinate x of domes is made as if one were at this times ``end``.
-_BEYOND = 1.005
 # Nodes of the free dome, and of pressed domes over x and along lines.
 _FREE, _STRAINS, _LINES = 64, 48, 48
 # Smallest x of these, over the largest, and ends of the lines: nearly free, and nearly flat.
 _LOW, _SPAN = 0.02, (3e-3, 0.9999)
 # Rows and columns of the table of pressed domes: x, and s.
 _ROWS, _CONTACTS = 512, 512
-# Places along a line between which its spline over s is made.
-_FINE = 800
 
 
 def inflate_rubber(pad: Pad, pressure: Array) -> Solved:
@@ -217,8 +209,8 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
     """
     from scipy.integrate import solve_ivp
 
-    if strain.size > _TOGETHER:
-        parts = math.ceil(strain.size / _TOGETHER)
+    if strain.size > 1000:  # BLAS would start threads for each step
+        parts = math.ceil(strain.size / 1000)
         pairs = zip(np.array_split(strain, parts), np.array_split(disc, parts), strict=True)
         found = [shapes(law, *pair, tolerance) for pair in pairs]
         return Shapes(*(np.concatenate(each) for each in zip(*found, strict=True)))
@@ -229,7 +221,7 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
 
     def rates(angle: Array, run: Array, along: Array, across: Array) -> tuple[Array, ...]:
         """Return the rates of R, λ1, λ2, z and V over the angle."""
-        if next(count) > _EVALUATIONS:
+        if next(count) > 20000:  # usual are 2,000
             raise InvalidInput(
                 f'the law {law[0]} {law[1]} (over its shear modulus) is too steep to be'
                 ' integrated: a smaller largest_stretch is needed'
@@ -315,7 +307,8 @@ class Domes:
             slope = push.deriv()
             self._most = brentq(lambda e: push(e) + e * slope(e), low, top, xtol=1e-14)
         self.end = self.pressure_at(self._most)
-        self._turn = self.end if self.balloons else _BEYOND * self.end
+        # Without a maximum of P, x is made as if one were slightly past the end.
+        self._turn = self.end if self.balloons else 1.005 * self.end
         self._free = self._spline(strain, span, free)
 
     def pressure_at(self, strain: float) -> float:
@@ -433,7 +426,7 @@ def _finer(values: Array) -> Array:
         _unit(np.linspace(0.0, 1.0, _ROWS), (_LOW, 1.0)), _STRAINS - 1
     )
     to_fine = np.polynomial.chebyshev.chebvander(
-        _unit(np.linspace(*_SPAN, _FINE), _SPAN), _LINES - 1
+        _unit(np.linspace(*_SPAN, 800), _SPAN), _LINES - 1
     )
     return np.asarray(to_rows @ _fit((to_fine @ _fit(values.T)).T))
 

@@ -45,9 +45,6 @@ THESIS_LIMIT = MeasuredLimit(force=0.2833, pressure=75e3, slope=1.25e-5)
 # The thesis measured up to 85 kPa; the line is extrapolated to the end of this pad's model.
 _THESIS_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
 
-# Share of its free height to which a dome lower than two sheets, or of unknown thickness, may go.
-LEAST_SHARE = 0.5
-
 
 def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRITERION) -> Floats:
     """Return the largest normal force on one pad at a pressure, N.
@@ -261,7 +258,8 @@ def _flattening(pad: Pad, p: Array) -> Array:
 
 def _room(pad: Pad, p: Array, force: Array) -> Array:
     """Return gap of a pressed dome less the least that ``thickness`` allows, over the radius."""
-    least = LEAST_SHARE * inflate(pad, np.atleast_1d(p)).height
+    # A dome lower than two sheets, or of unknown thickness, may go to half of its free height.
+    least = 0.5 * inflate(pad, np.atleast_1d(p)).height
     if pad.thickness is not None:
         least = np.minimum(least, pad.thickness)
     gap = np.nan_to_num(press(pad, np.atleast_1d(p), force).gap)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice, number, quantity
+from ros_pad.configuration import choice, instance, number, quantity
 from ros_pad.contact.dome import Pressed
 from ros_pad.contact.pad import Floats, broadcast, plain
 from ros_pad.errors import InvalidInput
@@ -168,12 +168,8 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
     0.0668
     """
     choice('reading', reading, ('corrected', 'thesis'))
-    if not isinstance(pressed, Pressed):
-        raise InvalidInput(
-            f'pressed = {pressed!r} is not allowed: the result of press() is needed'
-        )
-    if not isinstance(liquid, Liquid):
-        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    instance('pressed', pressed, Pressed)
+    instance('liquid', liquid, Liquid)
     status = np.asarray(pressed.status)
     b, sphere = np.asarray(pressed.contact_radius), np.asarray(pressed.sphere_radius)
     touching = b > 0
@@ -309,8 +305,7 @@ def capillary_pull(
     >>> round(1e3 * capillary_pull(1.5e-3, 3e-4, WATER), 2)
     4.14
     """
-    if not isinstance(liquid, Liquid):
-        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    instance('liquid', liquid, Liquid)
     weight, tension = liquid.density * number('gravity', gravity, 'm/s²'), liquid.surface_tension
     most = 2.0 * math.sqrt(tension / weight) if weight else math.inf
     r, h = quantity('radius', radius, 'm'), quantity('film', film, 'm', high=most, above=True)

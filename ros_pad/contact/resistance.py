@@ -75,22 +75,8 @@ FOOT_SETTINGS = (
     Setting('sole_radius', float, 'Radius of the sole.', 'm', 1e-3, 0.2),
     Setting('friction', float, 'Dry friction in proportion to load.', '(coefficient)', 0.01, 3.0),
     Setting('shear_strength', float, 'Shear strength of adhesive contact.', 'Pa', 0.0, 1e6),
-    Setting(
-        'conforming_pressure',
-        float,
-        'Mean pressure at which a flat sole touches all over.',
-        'Pa',
-        1.0,
-        1e7,
-    ),
-    Setting(
-        'boundary_friction',
-        float,
-        'Friction on a film that has not drained.',
-        '(coefficient)',
-        0.0,
-        3.0,
-    ),
+    Setting('conforming_pressure', float, 'Pressure for full contact of a sole.', 'Pa', 1.0, 1e7),
+    Setting('boundary_friction', float, 'Friction on a thick film.', '(coefficient)', 0.0, 3.0),
     Setting('critical_film', float, 'Film thickness for 1/e of dry contact.', 'm', 1e-9, 1e-3),
     Setting('film_exponent', float, 'Steepness of the loss of contact.', '(exponent)', 0.1, 10.0),
     Setting('shear_stiffness', float, 'Tangential stiffness of the foot.', 'N/m', 1.0, 1e7),
@@ -99,10 +85,6 @@ FOOT_SETTINGS = (
     Setting('capillary_force', 0.0, 'Tangential force of the liquid on a dome.', 'N', 0.0, 1.0),
 )
 """The other settings of a foot file."""
-
-_MAY_BE_ZERO = (
-    *('friction', 'shear_strength', 'boundary_friction', 'chamber_volume', 'capillary_force'),
-)
 
 
 @dataclass(frozen=True)
@@ -175,7 +157,7 @@ class Foot:
 
     def __post_init__(self) -> None:
         for each in FOOT_SETTINGS[1:]:
-            above = each.name not in _MAY_BE_ZERO
+            above = each.low > 0.0 and each.name != 'friction'
             number(each.name, getattr(self, each.name), each.unit, above=above)
         fit = int((self.sole_radius / self.pad.radius) ** 2)
         integer('pads', self.pads, 1, fit, f'(at most {fit} fit on the sole)')

@@ -31,27 +31,6 @@ from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, NoSurface
 
-TRAPPED = 4.0 / math.pi * (4.0 / 3.0 - 1.0)
-"""Mean depth of the dimple that uniform pressure p presses into a half-space, in units of p a/E*:
-mean deflection of the loaded disc, 16/(3π), less that of its rim, 4/π."""
-
-DIMPLE = 2.0 - 4.0 / math.pi
-"""Depth of that dimple in its middle, in the same units."""
-
-RIM_BEND = 1.20985
-"""Outer curvature of the rim of a dimple under constant tension, by d³H/dx³ = 1/H³ and an inner
-slope of 1."""
-
-STIFF = 0.1
-"""Mean dimple over the film of Stefan and Reynolds up to which that film is the mean film within
-10 % (``python -m studies film``)."""
-
-LARGE_STRAIN = 0.2
-"""Mean pressure over reduced modulus above which linear elasticity is a guess."""
-
-CONTINUUM = 1e-9
-"""Film, m, below which a liquid is no continuum."""
-
 _STIFFEST = 1e-6  # of the initial film: a smaller dimple is lost in rounding
 # Rings are narrow near the rim of the contact, over this share of the contact's radius.
 _FLAT_RIM, _CURVED_RIM = 1e-4, 0.03
@@ -377,8 +356,8 @@ def squeeze(
         )
     films = found.y[:-1].T
     pressures = np.array([pressure_of(t, h) for t, h in zip(found.t, films, strict=True)])
-    strained = isinstance(surface, HalfSpace) and p0 > LARGE_STRAIN * surface.modulus
-    touching = float(films.min()) * initial < CONTINUUM
+    strained = isinstance(surface, HalfSpace) and p0 > 0.2 * surface.modulus
+    touching = float(films.min()) * initial < 1e-9
     return Squeezed(
         times, a * middles, a**2 * area, initial * films, p0 * pressures,
         p0 * a**2 * (pressures @ area), a**2 * initial * found.y[-1],
@@ -389,9 +368,9 @@ def squeeze(
 def trapped_film(radius: float, modulus: float, pressure: float) -> float:
     """Return the mean film that a flat soft sole traps for good once its rim has closed.
 
-    It is the dimple of a half-space under uniform pressure, :data:`TRAPPED` p a/E*: a film that
-    drains outward everywhere has a pressure that falls outward, and of these pressures the uniform
-    one has the flattest dimple.
+    It is the dimple of a half-space under uniform pressure, 4 (4/3 - 1)/π p a/E*: the mean
+    deflection of the loaded disc less that of its rim. A film that drains outward everywhere has a
+    pressure that falls outward, and of these pressures the uniform one has the flattest dimple.
 
     Parameters
     ----------
@@ -419,59 +398,7 @@ def trapped_film(radius: float, modulus: float, pressure: float) -> float:
     13.6
     """
     number('pressure', pressure, 'Pa')
-    return TRAPPED * pressure * HalfSpace(radius, modulus).compliance
-
-
-def dome_dimple(
-    contact_radius: float,
-    sphere_radius: float,
-    pressure: float,
-    time: float,
-    viscosity: float = WATER_VISCOSITY,
-) -> float:
-    """Return the film, m, in the middle of a dome's contact after a time, s, under constant load.
-
-    The dimple is a paraboloid, which drains through its rim (Frankel and Mysels, J. Phys. Chem.
-    66 (1962) 190): a limit for long times, 3 % too thick after 30 ms on the thesis' dome.
-
-    Parameters
-    ----------
-    contact_radius, sphere_radius : float
-        Radius of the contact and of the dome's sphere, m, above 0.
-    pressure : float
-        Gauge pressure of the air, Pa, above 0.
-    time : float
-        Time since touch-down, s, above 0.
-    viscosity : float
-        Dynamic viscosity, Pa s, above 0.
-    """
-    b = number('contact_radius', contact_radius, 'm', above=True)
-    r = number('sphere_radius', sphere_radius, 'm', above=True)
-    p = number('pressure', pressure, 'Pa', above=True)
-    t = number('time', time, 's', above=True)
-    eta = number('viscosity', viscosity, 'Pa s', above=True)
-    return float((3.0 * eta * b**6 / (32.0 * RIM_BEND * p * r**2 * t)) ** 0.25)
-
-
-def dry_share(middle: float, critical_film: float, exponent: float = 2.0) -> float:
-    """Return the share of dry contact exp(-(h/h_c)^m) under a dimple, a paraboloid.
-
-    Parameters
-    ----------
-    middle : float
-        Film in the middle of the dimple, m, from 0.
-    critical_film : float
-        h_c, m, above 0.
-    exponent : float
-        m, above 0.
-    """
-    from scipy.special import gamma, gammainc
-
-    deep = number('middle', middle, 'm') / number('critical_film', critical_film, 'm', above=True)
-    power = 1.0 / number('exponent', exponent, '', above=True)
-    if deep < 1e-9:
-        return 1.0
-    return float(gamma(1.0 + power) * gammainc(power, deep ** (1.0 / power)) / deep)
+    return 4.0 / math.pi * (4.0 / 3.0 - 1.0) * pressure * HalfSpace(radius, modulus).compliance
 
 
 def _edges(rings: int, surface: HalfSpace | Membrane, load: float) -> Array:

@@ -9,7 +9,7 @@ from ros_pad.capillary.coupling import press_wet
 from ros_pad.contact.dome import press
 from ros_pad.contact.meniscus import WATER
 from ros_pad.contact.pad import LARGE_PAD, Pad
-from ros_pad.errors import InvalidInput, NoEquilibrium, NoSurface
+from ros_pad.errors import InvalidInput, NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
 pytestmark = pytest.mark.slow
@@ -90,12 +90,6 @@ def test_liquid_at_the_rim_is_refused():
     with pytest.raises(NoSurface, match='rim') as refusal:
         press_wet(LARGE_PAD, 40e3, 0.05, WATER)
     assert refusal.value.status == 'rim'
-
-
-def test_a_dry_pad_without_equilibrium_stays_one():
-    with pytest.raises(NoEquilibrium) as refusal:
-        press_wet(LARGE_PAD, 75e3, 0.6, WATER)
-    assert refusal.value.status == 'flattened'
 
 
 @pytest.mark.parametrize(

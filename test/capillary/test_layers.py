@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_pad.capillary import Mesh, Wall, bath_meniscus, wet, wet_pattern
+from ros_pad.capillary import Mesh, wet, wet_pattern
 from ros_pad.capillary.layers import BALANCES
 from ros_pad.capillary.mesh import revolved
 from ros_pad.contact import WATER, Liquid, hysteresis_force
@@ -93,78 +93,7 @@ def test_the_error_falls_with_the_square_of_the_layers(balance: str):
     assert errors[-1] < 3e-4
 
 
-@pytest.mark.parametrize(
-    ('balance', 'order', 'fine'),
-    [('energy', 1.1, 2e-3), ('force', 1.9, 2e-4), ('thesis', 1.8, 2e-4)],
-)
-@pytest.mark.slow
-def test_the_error_falls_with_the_size_of_the_facets(balance: str, order: float, fine: float):
-    # Facets lie slightly inside the true surface and their slope jumps. So errors change sign, and
-    # only their root mean square over several liquids falls steadily.
-    liquids = [Liquid(tension, 0.5 * tension) for tension in (0.0015, 0.002, 0.003, 0.005, 0.008)]
-
-    def heights(rings: int, sectors: int):
-        mesh = dome_of(rings, sectors)
-        return np.array([wet(mesh, each, balance, 400, 8).mean_height for each in liquids])
-
-    exact, counts = heights(400, 400), [6, 12, 24, 48, 96]
-    errors = [np.sqrt(np.mean((heights(n, 2 * n) / exact - 1.0) ** 2)) for n in counts]
-    measured = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    assert measured == pytest.approx(order, abs=0.35)
-    assert errors[-1] < fine
-
-
-def test_height_rises_with_the_tension_of_the_solid_up_to_complete_wetting(dome: Mesh):
-    # The thesis says this of its figure 29, but also that the height converges to a maximum before
-    # complete wetting, which is wrong.
-    ratios = np.linspace(0.25, 1.0, 16)
-    heights = np.array(
-        [wet(dome, Liquid(0.002, 0.002 * ratio), slices=4).mean_height for ratio in ratios]
-    )
-    assert (np.diff(heights) > 0.0).all()
-    assert np.diff(heights)[-1] > np.diff(heights)[7]
-
-
 # --- Closed forms ------------------------------------------------------------------------------
-
-
-def height_on_a_plane(balance: str, theta: float, tension: float) -> float:
-    """Return the height, m, of an arc on an upright plane, from integrals over the circle."""
-    last = 0.5 * math.pi - theta
-    sine, cosine = math.sin(last), math.cos(last)
-    section = (
-        sine - 0.5 * last - 0.25 * math.sin(2.0 * last)
-    )  # area of the liquid's section over R²
-    # First moment of the section over R³: half the integral of (1 - cos t)² cos t.
-    lifted = 0.5 * (sine - (last + sine * cosine) + sine - sine**3 / 3.0)
-    weight = 9810.0
-    if balance == 'force':
-        radius = math.sqrt(tension * math.cos(theta) / (weight * section))
-    elif balance == 'energy':
-        gain = math.cos(theta) * (1.0 - cosine) - (last - sine)
-        radius = math.sqrt(tension * gain / (3.0 * weight * lifted))
-    else:
-        radius = math.sqrt(tension * math.cos(theta) * (1.0 - cosine) / (2.0 * weight * lifted))
-    return radius * (1.0 - cosine)
-
-
-@pytest.mark.parametrize('degrees', [0.0, 30.0, 60.0])
-@pytest.mark.parametrize('balance', BALANCES)
-def test_a_wide_cylinder_is_an_upright_plane(balance: str, degrees: float):
-    exact = height_on_a_plane(balance, math.radians(degrees), 0.073)
-    # The wall's curvature adds a term in proportion to 1 / radius; two radii remove it.
-    near, far = (
-        wet(
-            Mesh.cylinder(radius, 10e-3, sectors=360),
-            liquid(degrees),
-            balance,
-            400,
-            4,
-            strict=False,
-        ).mean_height
-        for radius in (0.05, 0.2)
-    )
-    assert (4.0 * far - near) / 3.0 == pytest.approx(exact, rel=1e-3)
 
 
 def test_the_circle_and_its_pressure():
@@ -179,18 +108,12 @@ def test_the_circle_and_its_pressure():
     assert (found.pressure < 0.0).all()  # the arc curves more than the ring: it pulls
     assert found.height_spread < 1e-6 * found.mean_height
     section = 2.0 * found.ring_radii[0] * found.mean_height
-    for direction in (0.0, 1.0, [0.3, -2.0], (0.0, 1.0, 5.0)):
+    for direction in (0.0, 1.0):
         assert found.section(direction) == pytest.approx(section, rel=1e-4)
         assert found.force(direction) == pytest.approx(found.pressure[0] * section, rel=1e-4)
         assert found.hysteresis_force(direction, 2.0, 1.0) == pytest.approx(
             hysteresis_force(found.ring_radii[0], 0.01, 2.0, 1.0), rel=1e-4
         )
-
-
-def test_the_arc_meets_wall_and_floor():
-    found = wet(Mesh.cone(1e-3, 2e-3, 4e-3, sectors=180), liquid(20.0))
-    turn = math.cos(math.radians(20.0) + math.atan2(4.0, 1.0)) + 1.0
-    assert found.curvature_radius == pytest.approx(found.heights / turn, rel=1e-3)
 
 
 # --- Any shape ---------------------------------------------------------------------------------
@@ -217,8 +140,8 @@ def test_slices_of_a_general_shape_differ():
     assert found.heights[0] > 1.02 * found.heights[9]
     assert found.height_spread == pytest.approx(found.heights[0] - found.heights[9], rel=0.02)
     low, high = found.heights.min(), found.heights.max()
-    assert 2e-3 * low < found.section([1.0, 0.0]) < 2e-3 * high
-    assert 4e-3 * low < found.section([0.0, 1.0]) < 4e-3 * high
+    assert 2e-3 * low < found.section(0.0) < 2e-3 * high
+    assert 4e-3 * low < found.section(0.5 * math.pi) < 4e-3 * high
 
 
 def test_where_the_mesh_stands_and_how_it_is_listed_does_not_matter(dome: Mesh):
@@ -227,13 +150,6 @@ def test_where_the_mesh_stands_and_how_it_is_listed_does_not_matter(dome: Mesh):
     there = wet(moved, WATER)
     assert there.axis == pytest.approx((0.01, -0.02), abs=1e-9)
     assert there.heights == pytest.approx(plain.heights, rel=1e-9)
-    rng = np.random.default_rng(1)
-    names = rng.permutation(len(dome.points))
-    places = np.empty_like(names)
-    places[names] = np.arange(names.size)
-    faces = np.roll(places[dome.faces][rng.permutation(len(dome.faces))], 1, axis=1)
-    mixed = wet(Mesh(dome.points[names], faces), WATER)
-    assert mixed.heights == pytest.approx(plain.heights, rel=1e-9)
     turn = 0.123
     turned = dome.points @ [
         [math.cos(turn), math.sin(turn), 0],
@@ -297,7 +213,6 @@ def test_a_low_pad_is_saturated(balance: str):
     found = wet(Mesh.cylinder(1e-3, 0.05e-3), liquid(10.0), balance)
     assert set(found.status) == {'saturated'}
     assert math.isnan(found.mean_height)
-    assert found.top == pytest.approx(0.05e-3)
 
 
 @pytest.mark.parametrize('balance', BALANCES)
@@ -306,19 +221,6 @@ def test_a_rise_of_less_than_a_layer_is_called_coarse(balance: str):
     thin = liquid(60.0, 1e-4)
     assert set(wet(mesh, thin, balance, layers=10).status) == {'coarse'}
     assert set(wet(mesh, thin, balance, layers=4000, slices=4, strict=False).status) == {'ok'}
-
-
-@pytest.mark.parametrize('balance', BALANCES)
-def test_what_is_given_on_a_dome_is_near_to_the_exact_meniscus(dome: Mesh, balance: str):
-    given = 0
-    for row in REFERENCE:
-        found = wet(dome, Liquid(row['gl'], row['gl'] * row['gs_gl']), balance, slices=4)
-        assert set(found.status) <= {'ok', 'far_off', 'saturated', 'dry'}
-        if found.status[0] == 'ok':
-            assert error(found.mean_height, row['exact_bath']) < 0.25
-            given += 1
-    # Energy and force give almost all heights, the thesis only the few that happen to be right.
-    assert given >= (20 if balance != 'thesis' else 3)
 
 
 @pytest.mark.parametrize('balance', BALANCES)
@@ -343,42 +245,6 @@ def test_what_is_given_on_a_cylinder_is_near_to_the_exact_meniscus(row, balance:
     assert (found.status[0] == 'ok') == good
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('degrees', [0.0, 11.0, 75.0])
-@pytest.mark.parametrize('radius', [0.03, 1.5])  # in capillary lengths
-def test_what_is_given_on_cones_and_domes_is_near_to_the_exact_meniscus(
-    radius: float, degrees: float
-):
-    water = liquid(degrees)
-    length = math.sqrt(0.073 / (1000.0 * 9.80665))
-    base = radius * length
-    bodies = [
-        (Wall.dome(base, share * base), Mesh.dome(base, share * base, reach * base, 64, 32))
-        for share, reach in ((0.1, 1.94), (0.8, 1.55))
-    ]
-    for slope in (30.0, 68.0, 80.0, 110.0):
-        wall = Wall.cone(base, math.radians(slope), 4.0 * length)
-        height = 3.0 * bath_meniscus(wall=wall, liquid=water).height
-        lean = 1.0 / math.tan(math.radians(slope))
-        if not height > 0.0 or base + height * lean < 0.01 * base:
-            continue
-        bodies.append((wall, Mesh.cone(base, base + height * lean, height, 24, 32)))
-    if degrees:
-        # Arcs describe the liquid at domes well, however slender: neither dome is refused.
-        assert {wet(mesh, water, 'energy', 200, 3).status[0] for _, mesh in bodies[:2]} == {'ok'}
-    given = 0
-    for wall, mesh in bodies:
-        exact = bath_meniscus(wall=wall, liquid=water).height
-        for balance in BALANCES:
-            found = wet(mesh, water, balance, 200, 3)
-            if found.status[0] != 'ok':
-                continue
-            off = found.mean_height / exact - 1.0
-            assert -0.15 < off < (0.18 if balance == 'energy' else 0.34)
-            given += 1
-    assert given
-
-
 def test_where_no_arc_fits_there_is_no_circle():
     # A thin waist above a wide base: an arc from the brim to the floor would cut the base.
     r = np.array([1.0, 0.98, 0.6, 0.3, 0.3, 0.6, 0.98, 1.0]) * 2e-3
@@ -401,11 +267,9 @@ def test_slices_that_do_not_meet_the_wall_once_are_refused():
     [
         ({'balance': 'best'}, "balance = 'best'"),
         ({'layers': 3}, 'layers = 3'),
-        ({'layers': 10.0}, 'layers = 10.0'),
         ({'slices': 2}, 'slices = 2'),
         ({'axis': (0.0,)}, 'axis = (0.0,)'),
         ({'axis': (0.0, math.nan)}, 'axis = nan'),
-        ({'mesh': 'dome.stl'}, "mesh = 'dome.stl'"),
         ({'liquid': 'water'}, "liquid = 'water'"),
     ],
 )
@@ -413,12 +277,6 @@ def test_what_is_asked_is_checked(dome: Mesh, options, part: str):
     with pytest.raises(InvalidInput) as refused:
         wet(**{'mesh': dome, 'liquid': WATER} | options)
     assert part in str(refused.value)
-
-
-@pytest.mark.parametrize('direction', [math.inf, [0.0, 0.0], [0.0, 0.0, 1.0], [1.0], 'north'])
-def test_directions_that_point_nowhere(dome: Mesh, direction):
-    with pytest.raises(InvalidInput, match='direction'):
-        wet(dome, WATER, slices=4).force(direction)
 
 
 # --- Many pads ---------------------------------------------------------------------------------
@@ -500,16 +358,6 @@ def test_level_surfaces_between_bodies_of_any_height_have_the_least_energy(spans
         assert height == pytest.approx(expected, abs=2.0 * 9e-3 / layers)
 
 
-def test_one_mesh_of_many_domes_is_many_meshes_of_one():
-    area = 7 * math.sqrt(0.75) * 4e-3**2
-    shape = {'sphere_radius': 1.5e-3, 'contact_radius': 0.3e-3, 'height': 2.8e-3}
-    one = Mesh.dome(**shape, rings=24, sectors=48)
-    all_seven = wet_pattern(Mesh.dome_pattern(7, 4e-3, **shape), liquid(60.0), area)
-    seven = wet_pattern(one, liquid(60.0), area, 7)
-    assert all_seven.height == pytest.approx(seven.height, rel=1e-9)
-    assert all_seven.volume == pytest.approx(seven.volume, rel=1e-9)
-
-
 def test_pads_that_do_not_fit_are_refused():
     mesh = Mesh.dome(1.5e-3, 0.5e-3)
     with pytest.raises(MeshError, match='the pads overlap'):
@@ -547,28 +395,3 @@ def test_any_pattern_has_a_height_within_it_or_a_reason(
         assert 0.0 < found.volume < area * found.height
     else:
         assert np.isnan(numbers).all()
-
-
-def test_sections_of_a_body_with_a_bore():
-    # All room without a pad is void, and so is the bore of this washer.
-    washer = _washer(1e-3, 2e-3, 3e-3)
-    found = wet_pattern(washer, liquid(60.0, 0.01), area=2e-5, layers=100)
-    ring = 0.5 * 60 * math.sin(2 * math.pi / 60) * (4e-6 - 1e-6)
-    assert found.void_area == pytest.approx(2e-5 - ring, rel=1e-9)
-
-
-def _washer(inner: float, outer: float, height: float) -> Mesh:
-    turns = 2.0 * math.pi * np.arange(60) / 60
-    ring = np.column_stack([np.cos(turns), np.sin(turns)])
-    profile = [(inner, 0.0), (outer, 0.0), (outer, height), (inner, height)]
-    points = np.concatenate([np.column_stack([r * ring, np.full(60, z)]) for r, z in profile])
-    here = np.arange(60)
-    there = np.roll(here, -1)
-    faces = []
-    for k in range(4):
-        low, high = 60 * k, 60 * ((k + 1) % 4)
-        faces += [
-            np.column_stack([low + here, low + there, high + there]),
-            np.column_stack([low + here, high + there, high + here]),
-        ]
-    return Mesh(points, np.concatenate(faces), 'washer')

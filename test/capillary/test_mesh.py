@@ -62,11 +62,6 @@ def test_a_pattern_is_hexagonal():
     assert sorted(neighbours) == [3] * 6 + [4] * 6 + [6] * 7
 
 
-def test_domes_that_overlap_are_refused():
-    with pytest.raises(MeshError, match=r'pitch = .* above 0\.0031 m'):
-        Mesh.dome_pattern(7, 3e-3, R, B)
-
-
 @pytest.mark.parametrize(
     ('call', 'part'),
     [
@@ -99,8 +94,7 @@ FLAT[3] = np.nan
 @pytest.mark.parametrize(
     ('points', 'faces', 'part'),
     [
-        (np.empty((0, 3)), CUBE_FACES, 'no triangles'),
-        (CUBE_POINTS, np.empty((0, 3), int), 'no triangles'),
+        (np.empty((0, 3)), CUBE_FACES, '(0, 3)'),
         (CUBE_POINTS[:, :2], CUBE_FACES, '(8, 2)'),
         (CUBE_POINTS, CUBE_FACES.astype(float), 'integers'),
         (CUBE_POINTS, CUBE_FACES + 1, '1 to 8'),
@@ -114,7 +108,7 @@ FLAT[3] = np.nan
         (CUBE_POINTS + np.array([0, 0, 1e-4]), CUBE_FACES, 'lift = -0.0001 m'),
         (CUBE_POINTS - np.array([0, 0, 1e-4]), CUBE_FACES, 'lift = 0.0001 m'),
         (1e3 * CUBE_POINTS, CUBE_FACES, 'scale=1e-3'),
-        (1e-3 * CUBE_POINTS, CUBE_FACES, 'at least 1e-05 m'),
+        (1e-3 * CUBE_POINTS, CUBE_FACES, '1e-05 to 0.5 m'),
     ],
 )
 def test_broken_meshes_are_refused(points, faces, part: str):
@@ -146,32 +140,11 @@ def test_a_body_that_cuts_itself_is_refused():
         changed(points, cylinder.faces)
 
 
-def test_bodies_that_touch_in_a_point_are_two():
-    # The cubes share a vertex, as in a file with merged vertices, but count as two bodies.
-    points = np.concatenate([CUBE_POINTS, CUBE_POINTS[1:] + 1e-3])
-    second = np.concatenate([[7], np.arange(8, 15)])[CUBE_FACES]
-    assert changed(points, np.concatenate([CUBE_FACES, second])).volume == pytest.approx(2e-9)
-    with pytest.raises(MeshError, match='1 of 2 bodies'):
-        changed(points, np.concatenate([CUBE_FACES, second[:, ::-1]]))
-
-
 def test_what_files_miss_the_floor_by_is_taken_off():
     for low in (-5e-9, 5e-9):
         mesh = changed(CUBE_POINTS + np.array([0, 0, low]))
         assert mesh.points[:, 2].min() == 0.0
         assert mesh.height == pytest.approx(1e-3, rel=1e-9)
-
-
-def test_two_bodies_are_a_mesh():
-    assert changed(TWO, np.concatenate([CUBE_FACES, 8 + CUBE_FACES])).volume == pytest.approx(2e-9)
-
-
-def test_a_mesh_cannot_be_changed_afterwards():
-    mesh = cube()
-    with pytest.raises(ValueError, match='read-only'):
-        mesh.points[0] = 1.0
-    CUBE_POINTS.copy()[0] = 0.0  # the arrays that it was made of stay writable
-    assert CUBE_POINTS.flags.writeable
 
 
 @pytest.mark.parametrize('suffix', ['.stl', '.obj', '.ply', '.msh'])
@@ -207,21 +180,6 @@ def test_quadrangles_and_tetrahedra_are_read(tmp_path: pathlib.Path):
     solid = Mesh.read(path)
     assert len(solid.faces) == 12
     assert solid.volume == pytest.approx(1e-9, rel=1e-9)
-
-
-def test_text_stl_in_millimetres(tmp_path: pathlib.Path):
-    pytest.importorskip('meshio')
-    corners = 1e3 * CUBE_POINTS[CUBE_FACES]
-    lines = ['solid cube']
-    for a in corners:
-        lines += ['facet normal 0 0 0', 'outer loop']
-        lines += [f'vertex {x:g} {y:g} {z:g}' for x, y, z in a]
-        lines += ['endloop', 'endfacet']
-    path = tmp_path / 'cube.STL'
-    path.write_text('\n'.join([*lines, 'endsolid']))
-    with pytest.raises(MeshError, match='scale=1e-3'):
-        Mesh.read(path)
-    assert Mesh.read(path, scale=1e-3).volume == pytest.approx(1e-9, rel=1e-9)
 
 
 @pytest.mark.parametrize(

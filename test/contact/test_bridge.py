@@ -180,47 +180,6 @@ def test_cylinder():
     assert again.filling_angle == pytest.approx(beta, rel=1e-6)
 
 
-def test_sphere_of_liquid_pulls_with_nothing():
-    # Liquid sphere of radius s round (0, m): it meets the plane at the angle acos(-m/s).
-    s, m, gap = 1.3, 0.4, 0.2
-    top = 1.0 + gap
-    z = ((s * s - m * m) - (1.0 - top * top)) / (2.0 * (top - m))  # where both spheres meet
-    beta = math.acos(top - z)
-    edge = math.sin(beta)
-    theta = math.atan2(edge, m - z) - beta  # difference of inclinations of liquid and sphere
-    plane = math.acos(-m / s)
-    found = bridge(1.0, 1.0, theta, filling_angle=beta, separation=gap, plane_angle=plane)
-    assert found.force == pytest.approx(0.0, abs=1e-12)
-    assert found.pressure == pytest.approx(2.0 / s, rel=1e-12)
-    assert found.floor_radius == pytest.approx(math.sqrt(s * s - m * m), rel=1e-12)
-    under = math.pi * (s * s * z - ((z - m) ** 3 + m**3) / 3.0)
-    assert found.volume == pytest.approx(under - cap(beta), rel=1e-12)
-
-
-def test_catenoid_has_no_pressure():
-    # The catenoid r = a cosh((z - m) / a) has the slope dr/dz = sinh((z - m) / a).
-    a, m, z, gap = 0.3, 0.15, 0.33, 0.25
-    edge = a * math.cosh((z - m) / a)
-    # The sphere through (edge, z) whose lowest point is at the gap, scaled to radius 1.
-    size = (edge**2 + (z - gap) ** 2) / (2.0 * (z - gap))
-    beta = math.asin(edge / size)
-    assert math.cos(beta) == pytest.approx(1.0 - (z - gap) / size)
-    theta = math.atan2(1.0, math.sinh((z - m) / a)) - beta
-    plane = math.pi - math.atan2(1.0, math.sinh(-m / a))
-    found = bridge(size, 1.0, theta, filling_angle=beta, separation=gap, plane_angle=plane)
-    assert found.pressure == pytest.approx(0.0, abs=1e-11)
-    assert found.force == pytest.approx(2.0 * math.pi * a, rel=1e-12)
-    assert found.neck_radius == pytest.approx(a, rel=1e-11)
-    assert found.floor_radius == pytest.approx(a * math.cosh(m / a), rel=1e-12)
-
-
-def test_complete_wetting_ends_in_a_catenoid():
-    # Liquid spreads wide on the plane: pressure vanishes, and tension alone pulls with 2 pi sin².
-    (beta,) = degrees(170)
-    found = bridge(1.0, 1.0, 0.0, filling_angle=beta)
-    assert found.force == pytest.approx(2.0 * math.pi * math.sin(beta) ** 2, rel=1e-12)
-
-
 @pytest.mark.parametrize(('theta', 'plane'), [(0.0, 0.0), (0.3, 0.3), (0.3, 2.0)])
 @pytest.mark.slow
 def test_rupture(theta, plane):
@@ -269,12 +228,6 @@ def test_past_the_least_filling_angle():
     assert narrow.volume == pytest.approx(0.72e-3, rel=1e-9) and narrow.status == 'ok'
     assert narrow.neck_radius < 0.7 * wide.neck_radius
     check_by_shooting(narrow, 0.3, 2.0)
-
-
-@pytest.mark.parametrize('extra', [{}, {'gravity': 9.81}])
-def test_too_much_liquid_drowns_the_sphere(extra):
-    with pytest.raises(NoBridge, match='covers the sphere'):
-        bridge(1e-4, 0.073, math.radians(120), volume=1e-10, **extra)
 
 
 # --- Gravity
@@ -346,23 +299,6 @@ def test_circle_comes_near_the_exact_bridge():
         assert again.filling_angle == pytest.approx(beta, rel=1e-9)
 
 
-def test_circle_ends_where_its_neck_closes():
-    known = {'separation': 0.05, 'method': 'circle'}
-    turns = np.linspace(0.01, 0.05, 4001)
-    volumes = bridge(1.0, 1.0, 0.3, filling_angle=turns, **known).volume
-    least = np.nanmin(volumes)
-    found = bridge(1.0, 1.0, 0.3, volume=1.01 * least, **known)
-    assert found.volume == pytest.approx(1.01 * least, rel=1e-9)
-    assert found.neck_radius < 1e-3
-    with pytest.raises(NoBridge, match='rupture'):
-        bridge(1.0, 1.0, 0.3, volume=0.95 * least, **known)
-
-
-def test_circle_without_a_neck():
-    with pytest.raises(NoBridge, match='neck'):
-        bridge(1.0, 1.0, 0.0, filling_angle=0.1, separation=0.3, method='circle')
-
-
 # --- Input
 
 
@@ -370,20 +306,12 @@ def test_circle_without_a_neck():
     ('change', 'name'),
     [
         ({'radius': 0.0}, 'radius'),
-        ({'radius': [1e-3, 2e-3]}, 'radius'),
         ({'surface_tension': math.nan}, 'surface_tension'),
         ({'contact_angle': -0.1}, 'contact_angle'),
-        ({'contact_angle': 3.2}, 'contact_angle'),
         ({'contact_angle': [0.1, 0.2]}, 'contact_angle'),
-        ({'plane_angle': 3.2}, 'plane_angle'),
-        ({'filling_angle': 0.0}, 'filling_angle'),
         ({'filling_angle': math.pi}, 'filling_angle'),
         ({'filling_angle': None}, 'exactly one'),
-        ({'volume': 1e-10}, 'exactly one'),
         ({'filling_angle': None, 'volume': 0.0}, 'volume'),
-        ({'separation': -1e-6}, 'separation'),
-        ({'gravity': -9.81}, 'gravity'),
-        ({'density': 0.0}, 'density'),
         ({'method': 'toroid'}, 'young_laplace, circle'),
         ({'method': 'circle', 'gravity': 9.81}, 'gravity'),
     ],
@@ -392,8 +320,3 @@ def test_bad_input(change, name):
     good = {'radius': 1e-3, 'surface_tension': 0.073, 'contact_angle': 0.5, 'filling_angle': 0.5}
     with pytest.raises(InvalidInput, match=name):
         bridge(**{**good, **change})
-
-
-def test_what_does_not_broadcast():
-    with pytest.raises(InvalidInput, match='broadcast'):
-        bridge(1e-3, 0.073, [0.1, 0.2], filling_angle=[0.1, 0.2, 0.3], method='circle')

@@ -2,15 +2,12 @@
 import json
 import math
 import pathlib
-import subprocess
-import sys
 
 import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import fsolve
 
 from ros_pad.contact import LARGE_PAD, Pad, inflate, press
 from ros_pad.errors import InvalidInput, NoEquilibrium
@@ -66,16 +63,6 @@ class TestFree:
         assert inflate(pad, pressure).height == pytest.approx(height, rel=2e-15)
         assert inflate(pad, [pressure, 1.0]).height[0] == pytest.approx(height, rel=2e-15)
 
-    def test_gentle_pressure_follows_the_series(self):
-        p = np.geomspace(1e-9, 1e-3, 7)
-        expected = LARGE_PAD.radius * (p * LARGE_PAD.radius / LARGE_PAD.stiffness) / 2
-        np.testing.assert_allclose(inflate(LARGE_PAD, p).height, expected, rtol=1e-12)
-
-    def test_flat_at_zero_pressure(self):
-        dome = inflate(LARGE_PAD, 0)
-        assert (dome.height, dome.volume, dome.status) == (0.0, 0.0, 'ok')
-        assert math.isinf(dome.sphere_radius)
-
     def test_no_inflation_from_the_bursting_pressure_on(self):
         for pressure in (160e3, 161e3, 1e9):
             with pytest.raises(NoEquilibrium, match='Pa') as caught:
@@ -84,13 +71,6 @@ class TestFree:
         dome = inflate(LARGE_PAD, [75e3, 160e3, 159.99e3])
         assert dome.status.tolist() == ['ok', 'no_inflation', 'ok']
         assert np.isnan(dome.height).tolist() == [False, True, False]
-
-    @given(st.floats(1.0, 159e3), st.floats(1.0001, 1.5))
-    def test_grows_with_pressure(self, pressure, factor):
-        higher = min(pressure * factor, 159.9e3)
-        low, high = inflate(LARGE_PAD, pressure), inflate(LARGE_PAD, higher)
-        assert high.height > low.height
-        assert high.volume > low.volume
 
     @pytest.mark.parametrize(
         'pressure',
@@ -132,26 +112,6 @@ class TestPressed:
                 assert getattr(dome, name) == pytest.approx(float(row[name]), rel=1e-10), row
         assert (solved, flattened) == (39, 15)
 
-    def test_not_the_root_that_fsolve_falls_for(self):
-        pressure, force = 75e3, 0.52
-        r, k, energy = LARGE_PAD.radius, LARGE_PAD.stiffness, LARGE_PAD.adhesion_energy
-
-        def appendix(scaled):
-            """Return the residuals of the two equations of appendix 7.2.2, for lengths in mm."""
-            a, c = scaled * 1e-3
-            sphere = (r * r + c * c) / (2 * c)
-            b2 = (force + 2 * energy * math.pi * sphere) / (pressure * math.pi)
-            first = sphere - math.sqrt(max(sphere * sphere - b2, 0.0)) - a
-            pull = 2 * k * math.pi * (c + a) * (1.5 * math.sqrt(r * r + c * c - a * a) - r) / r
-            second = pressure * math.pi / 2 * (b2 + a * a + r * r + c * c) - pull - force
-            return [first * 1e3, second]
-
-        wrong, _, flag, _ = fsolve(appendix, [1.0, 1.3], full_output=True)
-        assert flag == 1 and wrong[1] > 0.9  # fsolve reports success
-        right = press(LARGE_PAD, pressure, force)
-        assert right.height < 0.05e-3
-        assert np.abs(appendix(np.array([right.depth, right.height]) * 1e3)).max() < 1e-12
-
     @settings(max_examples=100)
     @given(pressures, shares, st.sampled_from(['matlab', 'none']))
     def test_balances_and_certificate(self, pressure, share, adhesion):
@@ -183,30 +143,6 @@ class TestPressed:
         )
         assert certificate > 0
 
-    @given(st.floats(0.1, 3.4), shares, st.floats(1e-5, 1e-1), st.floats(0.1, 1e4))
-    def test_one_pad_is_every_pad(self, tension, share, radius, stiffness):
-        unit = Pad(1.0, 1.0, adhesion_energy=1.5e-4)
-        scaled = Pad(radius, stiffness, adhesion_energy=1.5e-4 * stiffness)
-        force = share * flattening(tension, unit)
-        one = press(unit, tension, force)
-        other = press(scaled, tension * stiffness / radius, force * stiffness * radius)
-        for name in LENGTHS:
-            assert getattr(other, name) / radius == pytest.approx(getattr(one, name), rel=1e-9)
-
-    def test_arrays_broadcast_and_equal_scalars(self):
-        p, f = np.array([[40e3], [60e3], [75e3]]), np.array([0.0, 0.01, 0.1, 0.25])
-        together = press(LARGE_PAD, p, f)
-        assert together.status.tolist() == [['ok'] * 4] * 3
-        for i in range(3):
-            for j in range(4):
-                alone = press(LARGE_PAD, p[i, 0], f[j])
-                assert alone.status == 'ok'
-                for name in LENGTHS:
-                    value = getattr(together, name)
-                    assert value.shape == (3, 4)
-                    assert value[i, j] == pytest.approx(getattr(alone, name), rel=1e-13)
-        assert isinstance(alone.height, float)
-
     @given(
         st.lists(st.tuples(st.floats(1e-3, 3.5), st.floats(0.0, 1.1)), min_size=1, max_size=30),
         st.sampled_from(['matlab', 'none']),
@@ -229,17 +165,6 @@ class TestPressed:
                 rel = 1e-13 / max(1e-4, abs(1.0 - share[row]))
                 assert together.height[row] == pytest.approx(alone.height, rel=rel)
                 assert together.contact_radius[row] == pytest.approx(alone.contact_radius, rel=rel)
-
-    def test_every_row_of_a_large_array_is_solved(self):
-        # Rows converge after different numbers of steps; a converged row must not change any more.
-        p, share = np.meshgrid(np.linspace(2e3, 91e3, 60), np.linspace(1e-4, 0.999, 400))
-        dome = press(LARGE_PAD, p, share * flattening(p))
-        assert (dome.status == 'ok').all()
-        assert (np.diff(dome.height, axis=0) < 0).all()
-        assert (np.diff(dome.height, axis=1) > 0)[:200].all()
-        for i, j in [(0, 0), (37, 3), (250, 20), (399, 59)]:
-            alone = press(LARGE_PAD, p[i, j], share[i, j] * flattening(p[i, j]))
-            assert dome.height[i, j] == pytest.approx(alone.height, rel=1e-11)
 
     def test_statuses_at_the_edges(self):
         cases = [
@@ -305,9 +230,3 @@ class TestPressed:
             press(LARGE_PAD, [1e3, 2e3], [0.1, 0.1, 0.1])
         with pytest.raises(InvalidInput, match=r'0\.4 J/m²'):
             press(Pad(1.5e-3, 40.0, adhesion_energy=0.5), 75e3, 0.1)
-
-
-def test_import_needs_no_scipy():
-    code = 'import sys, ros_pad.contact; print("scipy" in sys.modules)'
-    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == 'False'

@@ -49,18 +49,6 @@ def test_agrees_with_the_integrated_equation(start, pressure, radius, time, visc
     assert found == pytest.approx(expected, rel=1e-7)
 
 
-def test_without_pressure_or_time_nothing_drains():
-    assert film_thickness(3e-4, 0.0, 0.01, 1.0) == 3e-4
-    assert film_thickness(3e-4, 1e5, 0.01, 0.0) == 3e-4
-
-
-def test_broadcasts():
-    found = film_thickness([[1e-4], [2e-4]], [1e3, 2e3, 3e3], 0.01, 0.1)
-    assert found.shape == (2, 3)
-    assert found[1, 2] == film_thickness(2e-4, 3e3, 0.01, 0.1)
-    assert isinstance(film_thickness(1e-4, 1e3, 0.01, 0.1), float)
-
-
 @pytest.mark.parametrize('value', [-1.0, math.nan, 'thick'])
 @pytest.mark.parametrize(
     'name, unit',
@@ -114,25 +102,6 @@ def test_constant_load_on_the_flat_sole():
     assert film.under_domes == pytest.approx(3e-4)
 
 
-def soft_landing(time):
-    share = min(1.0, time / 0.1)
-    return 6.8 * share * share * (3.0 - 2.0 * share)
-
-
-def test_soft_landing_does_not_depend_on_the_step():
-    """A pad that lands softly has no contact area at first, so that ∫ p²/N dt diverges there."""
-    left = []
-    for dt in (4e-3, 1e-3, 1e-4):
-        film = Film(FOOT, VISCOSITY)
-        film.touch_down(3e-4)
-        stand(film, soft_landing, 75e3, 0.15, dt)
-        left.append(film.under_domes)
-    assert left == pytest.approx([left[-1]] * 3, rel=0.01)
-    # Ground that was touched last has drained for 0.05 s, ground touched first for 0.15 s.
-    assert left[-1] < dome_limit(6.8, 37, 75e3, 0.05)
-    assert left[-1] > 0.99 * dome_limit(6.8, 37, 75e3, 0.15)
-
-
 def test_growing_contact_averages_over_its_area():
     """For a steadily growing load, integrate d(A/h²)/dt = A 4p/(3ηb²) + (dA/dt)/h0²."""
     pressure, rate, thick = 75e3, 40.0, 2e-6
@@ -148,20 +117,3 @@ def test_growing_contact_averages_over_its_area():
     solution = solve_ivp(weighted, (1e-9, 0.2), [0.0], rtol=1e-9, atol=1e-9)
     expected = math.sqrt(rate * 0.2 / pressure / solution.y[0, -1])
     assert film.under_domes == pytest.approx(expected, rel=1e-3)
-
-
-def test_shrinking_contact_keeps_its_film():
-    film = Film(FOOT, VISCOSITY)
-    film.touch_down(3e-4)
-    film.drain(6.8, 0.0, 75e3, 0.3)
-    before = film.under_domes
-    film.drain(3.4, 0.0, 75e3, 1e-9)
-    assert film.under_domes == pytest.approx(before, rel=1e-6)
-    film.drain(6.8, 0.0, 75e3, 1e-9)  # the half touched again has a thick film
-    assert film.under_domes == pytest.approx(math.sqrt(2.0) * before, rel=1e-3)
-
-
-@pytest.mark.parametrize('viscosity', [0.0, -1e-3, math.nan, math.inf])
-def test_viscosity_of_a_film(viscosity):
-    with pytest.raises(InvalidInput, match='viscosity'):
-        Film(FOOT, viscosity)

@@ -73,22 +73,16 @@ def test_the_range_is_one_of_the_invariant():
     [
         (('rubber', YEOH), 'law = .*yeoh, neo_hookean, mooney_rivlin, ogden'),
         (('yeoh', YEOH[:2]), 'needs C1, C2, C3'),
-        (('yeoh', [YEOH]), 'needs C1, C2, C3'),
         (('neo_hookean', (7.5e4, 1.0, 0.0)), 'needs mu'),
-        (('mooney_rivlin', (1e5,)), 'needs C10, C01'),
         (('ogden', (1e5, 2.0, 1e5)), 'needs mu1, alpha1, mu2, alpha2'),
-        (('ogden', ()), 'needs mu1'),
         (('yeoh', (math.nan, 0.0, 0.0)), 'parameters = nan'),
-        (('yeoh', 'soft'), "parameters = 'soft'"),
         (('yeoh', (0.02626, 0.001854, -3.505e-5)), r'shear modulus = 0\.05252.* Pa'),
         (('neo_hookean', (150.0e9,)), 'shear modulus = 1500'),
-        (('neo_hookean', (-1.5e5,)), 'shear modulus = -150000'),
         # The fits to the database: C01 < 0, useless under biaxial load.
         (('mooney_rivlin', (59960.6, -52695.7)), r'ellipticity .* stretch of 1\.067'),
         (('mooney_rivlin', (1e5, -1e4), 6.0), r'ellipticity .* 3\.1.* smaller range'),
         # A fit to 2.5 with C3 < 0 does not hold over the whole range of the data.
         (('yeoh', (21741.5, 2979.07, -105.9), 11.4), r'ellipticity .* 2\.7'),
-        (('yeoh', YEOH, 1.0), r'largest_stretch = 1\.0'),
         (('yeoh', YEOH, 21.0), r'largest_stretch = 21\.0'),
         (('yeoh', YEOH, 4.5, None), 'source = None'),
     ],
@@ -163,11 +157,6 @@ def test_bad_material_files(tmp_path, old, new, words):
     path.write_text(OGDEN.replace(old, new))
     with pytest.raises(ConfigError, match=words):
         Material.load(path)
-
-
-def test_an_unknown_material_lists_the_shipped_ones():
-    with pytest.raises(ConfigError, match=r'no material named .*dragon_skin_10, .*ecoflex_00_50'):
-        Material.load('dragon_skin')
 
 
 def foot_file(tmp_path, pad, ceiling='40.0e+3'):

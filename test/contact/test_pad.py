@@ -36,13 +36,6 @@ def test_a_measured_limit_rises(values, name):
         MeasuredLimit(*values)
 
 
-def test_a_thickness_needs_no_material_but_is_checked():
-    assert Pad(1.5e-3, 40.0, thickness=0.4e-3).material is None
-    for value in (0.0, -1e-4, 2e-3, math.nan, '1 mm'):
-        with pytest.raises(InvalidInput, match='thickness'):
-            Pad(1.5e-3, 40.0, thickness=value)
-
-
 def test_a_measured_limit_is_one():
     with pytest.raises(InvalidInput, match=r'measured_limit = 0\.3 is not allowed'):
         Pad(1e-3, 40.0, measured_limit=0.3)

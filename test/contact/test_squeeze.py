@@ -1,19 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 
-from ros_pad.contact.squeeze import (
-    HalfSpace,
-    Membrane,
-    dome_dimple,
-    dry_share,
-    squeeze,
-    trapped_film,
-)
+from ros_pad.contact.squeeze import HalfSpace, Membrane, squeeze, trapped_film
 from ros_pad.errors import InvalidInput
 
 RADIUS, LOAD, MODULUS, WATER = 1.5e-3, 0.3, 395e3, 1.0e-3
@@ -57,30 +49,6 @@ def test_a_half_space_deflects_as_in_the_books(force, exact):
     assert errors[1] < 2e-3 and errors[1] < 0.3 * errors[0]
 
 
-def test_a_half_space_under_uniform_pressure():
-    """By integrals of Boussinesq's 1/(π E* distance): 2 p a/E* in the middle, 4/π at the rim."""
-    edges = np.array([0.0, 0.3, 0.7, 1.0])
-    at = np.array([1e-9, 0.5, 1.0, 4.0])
-    found = HalfSpace(RADIUS, MODULUS).deflection(edges, at)
-    assert found.sum(axis=1)[[0, 2]] == pytest.approx([2.0, 4.0 / math.pi], rel=1e-12)
-    for row, r in zip(found, at, strict=True):
-        for ring, (low, high) in zip(row, pairwise(edges), strict=True):
-
-            def chord(angle, r=r, low=low, high=high):
-                """Return how far a ray from radius r, at an angle to the axis, is in the ring."""
-                ends = []
-                for c in (low, high):
-                    root = c**2 - (r * math.sin(angle)) ** 2
-                    half = math.sqrt(max(root, 0.0))
-                    ends.append(max(0.0, r * math.cos(angle) + half)
-                                - max(0.0, r * math.cos(angle) - half))  # fmt: skip
-                return ends[1] - ends[0]
-
-            breaks = [math.asin(c / r) for c in edges if 0.0 < c < r]
-            value = quad(chord, 0.0, math.pi, points=breaks or None, limit=400, epsabs=1e-10)[0]
-            assert ring == pytest.approx(2.0 * value / math.pi, rel=1e-6)
-
-
 def test_a_membrane_deflects_as_a_paraboloid():
     r, found = deflections(Membrane(RADIUS, 50.0, 75e3), np.square, 50)
     assert found == pytest.approx(0.25 * (1.0 - r**2), rel=1e-10)
@@ -112,24 +80,6 @@ def test_a_flat_soft_sole_traps_a_lens():
     # The lens keeps its shape, and the rim closes as η E* a/(p² t): ten times in ten.
     assert film.thickness[:2, -1][0] / film.thickness[1, -1] == pytest.approx(10.0, rel=0.4)
     assert film.status == 'ok'
-
-
-@pytest.mark.parametrize(
-    'surface', [HalfSpace(RADIUS, MODULUS), Membrane(1.5 * 0.9e-3, 58.0, 75e3)]
-)
-def test_a_load_that_grows_slowly_traps_less(surface):
-    """While the load is small its dent is shallow, and what has left does not come back."""
-    means, shares = [], []
-    for rise in (0.0, 1e-3, 1e-2):
-        times = [0.5e-3, 1e-3, 0.02]
-        film = squeeze(surface, 3e-4, times, load=0.19, rise=rise, rings=80)
-        expected = [0.19 * (min(1.0, time / rise) if rise else 1.0) for time in times]
-        assert film.load == pytest.approx(expected, rel=1e-9)
-        assert balance(film) < 1e-9
-        means.append(film.thickness[-1, 0])
-        shares.append(film.dry_share(0.5e-6)[-1])
-    assert means[0] > 1.2 * means[1] > 1.2**2 * means[2]
-    assert shares[0] < shares[1] < shares[2]
 
 
 # --- published results for curved surfaces ----------------------------------------------------
@@ -168,8 +118,6 @@ def test_the_dimple_under_a_dome_drains_as_one_of_constant_tension():
         assert away[2] < 0.03
         assert away[2] < away[1] < away[0] < 0.15
     assert film.radius[film.thickness[-1].argmin()] == pytest.approx(contact, rel=0.01)
-    closed = [dome_dimple(contact, 2.0 / bend, pressure, float(t), WATER) for t in times]
-    assert closed == pytest.approx(middle, rel=1e-4)
 
 
 def test_a_pressed_sphere_ends_in_hertz_contact():
@@ -199,31 +147,6 @@ def test_liquid_and_load_are_kept_and_films_stay_positive(modulus):
     assert film.status == ('large_strain' if modulus == 40e3 else film.status)
 
 
-@pytest.mark.parametrize('seed', range(4))
-def test_films_of_random_surfaces(seed):
-    random = np.random.default_rng(seed)
-    radius, modulus = 10.0 ** random.uniform(-4.0, -1.5), 10.0 ** random.uniform(4.0, 7.0)
-    pressure, initial = 10.0 ** random.uniform(2.5, 5.5), 10.0 ** random.uniform(-6.0, -3.0)
-    load, time = pressure * math.pi * radius**2, 10.0 ** random.uniform(-3.0, 1.0)
-    surface = (
-        HalfSpace(radius, modulus),
-        HalfSpace(2.0 * radius, modulus, 0.75 * load / modulus / radius**3),
-        Membrane(2.0 * radius, pressure * radius, pressure),
-    )[seed % 3]
-    film = squeeze(
-        surface,
-        initial,
-        [0.5 * time, time],
-        load=load,
-        viscosity=10.0 ** random.uniform(-4.0, 0.0),
-        rise=float(random.choice([0.0, time])),
-        rings=40,
-    )
-    assert np.all(film.thickness > 0.0) and np.all(np.isfinite(film.pressure))
-    assert balance(film) < 1e-9
-    assert film.load[-1] == pytest.approx(load, rel=1e-9)
-
-
 def test_second_order_in_rings():
     sole = HalfSpace(RADIUS, MODULUS)
     means = [
@@ -241,15 +164,6 @@ def test_share_of_dry_contact():
     assert film.dry_share(1.0) == pytest.approx([1.0, 1.0])
 
 
-@pytest.mark.parametrize('middle, exponent', [(0.0, 2.0), (0.3e-6, 2.0), (5e-6, 2.0), (2e-6, 1.0)])
-def test_dry_share_under_a_paraboloid(middle, exponent):
-    def ring(r):
-        return 2.0 * r * math.exp(-((middle * (1.0 - r**2) / 0.5e-6) ** exponent))
-
-    expected = quad(ring, 0.0, 1.0, epsabs=1e-12)[0]
-    assert dry_share(middle, 0.5e-6, exponent) == pytest.approx(expected, rel=1e-9)
-
-
 # --- refusals ---------------------------------------------------------------------------------
 
 
@@ -258,13 +172,9 @@ def test_dry_share_under_a_paraboloid(middle, exponent):
     [
         ({'initial': 0.0}, 'initial = 0.0 .* m'),
         ({'load': -1.0}, 'load = -1.0 .* N'),
-        ({'viscosity': 0.0}, 'viscosity = 0.0 .* Pa s'),
         ({'time': [0.1, 0.1]}, 'time = .* rising'),
-        ({'time': [0.0]}, 'time = .* rising'),
         ({'time': -1.0}, 'time = -1.0 .* s'),
         ({'rings': 5}, 'rings = 5 .* 10 to 2000'),
-        ({'time': []}, 'time = .* rising'),
-        ({'rise': -1.0}, 'rise = -1.0 .* s'),
         ({'tolerance': 1.0}, 'tolerance = 1.0'),
         ({'surface': HalfSpace(RADIUS, 1e13)}, 'it is rigid, use film_thickness'),
         ({'surface': Membrane(1e-3, 50.0, 1e5)}, r'radius = 0.001 m .* 0.001466 m, is needed'),
@@ -281,12 +191,8 @@ def test_refused(changed, words):
     [
         (lambda: HalfSpace(0.0, 1e5), 'radius = 0.0 .* m'),
         (lambda: HalfSpace(1e-3, -1.0), 'modulus = -1.0 .* Pa'),
-        (lambda: HalfSpace(1e-3, 1e5, -1.0), 'curvature = -1.0 .* 1/m'),
         (lambda: Membrane(1e-3, 0.0, 1.0), 'tension = 0.0 .* N/m'),
-        (lambda: Membrane(1e-3, 1.0, 0.0), 'pressure = 0.0 .* Pa'),
         (lambda: trapped_film(1e-3, 1e5, -1.0), 'pressure = -1.0 .* Pa'),
-        (lambda: dome_dimple(1e-3, 1e-3, 1e5, 0.0), 'time = 0.0 .* s'),
-        (lambda: dry_share(-1e-6, 1e-6), 'middle = -1e-06 .* m'),
     ],
 )
 def test_surfaces_refused(make, words):

@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ros_pad.contact.squeeze import STIFF
 from studies import command
 from studies.work_precision import film
 
@@ -18,8 +17,8 @@ def document():
 
 def test_the_rule_separates_rigid_from_soft_films():
     rows = film.rule(rings=25)
-    stiff = [row['excess'] for row in rows if row['dimple_over_film'] <= STIFF]
-    soft = [row['excess'] for row in rows if row['dimple_over_film'] >= 2.0 * STIFF]
+    stiff = [row['excess'] for row in rows if row['dimple_over_film'] <= film.STIFF]
+    soft = [row['excess'] for row in rows if row['dimple_over_film'] >= 2.0 * film.STIFF]
     assert len(stiff) > 5 and len(soft) > 5
     assert max(stiff) < 0.1 < min(soft)
     # The rigid film and the mean dimple together are more than the soft film.
