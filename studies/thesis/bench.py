@@ -190,9 +190,9 @@ def _inflation(scene: BenchScene) -> BenchTrial:
         ('stiffness', 'N/m', 'rises with deformation'): (same, stiffness),
     }
     rows = [
-        Row(15, quantity, unit, 'thesis', 'free', *numbers[:1], 0.0, *numbers[1:], stated)
+        Row(15, quantity, unit, 'thesis', 'free', p, 0.0, own, found, stated)
         for (quantity, unit, stated), values in columns.items()
-        for numbers in np.array([pressures, *values]).T.tolist()
+        for p, own, found in np.array([pressures, *values]).T.tolist()
     ]
     p = np.linspace(0.0, setup.highest_pressure, _POINTS)
     curve = inflate(pad, p)
@@ -284,8 +284,8 @@ def _press_rows(
         for figure, quantity, name in _PRESSED:
             columns = np.array([loads, getattr(shapes, name), points[quantity]])
             rows += [
-                Row(figure, quantity, 'm', model, condition, pressure, *numbers, NO_ERROR)
-                for numbers in columns.T.tolist()
+                Row(figure, quantity, 'm', model, condition, pressure, force, own, found, NO_ERROR)
+                for force, own, found in columns.T.tolist()
             ]
     for model in MODELS:
         shapes = press(pad, pressure, load, model=model)

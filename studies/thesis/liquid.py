@@ -317,8 +317,7 @@ def _over(ax: Any, column: int, at: Callable[[float, float], tuple[float, float]
             x, y = climbed(tension, balance)[column : column + 2]
             ax.plot(1e3 * x, 1e3 * y, color=colour, ls=style)
         for degrees in _ANGLES:
-            x, y = at(tension, degrees)
-            ax.plot(1e3 * x, 1e3 * y, 'o', color=colour)
+            ax.plot(*(1e3 * np.array(at(tension, degrees))), 'o', color=colour)
     ax.set(xlim=(0.0, None), ylim=(0.0, None))
 
 

@@ -106,8 +106,8 @@ def _figure_38(walks: Walks, number: int) -> Explained:
         rows = _part(trial, 2, 4)
         x, _, z = 1e3 * trial.position[rows, 0].T
         standing = trial.standing(view_of(trial).load_gate)[rows, 0]
-        wet = trial.floor is not None and trial.floor.wet(0.0, 0.0)
-        ax.axhspan(-3.0, 0.0, color=WET if wet else _DRY, lw=0.0)
+        watered = trial.floor is not None and trial.floor.wet(0.0, 0.0)
+        ax.axhspan(-3.0, 0.0, color=WET if watered else _DRY, lw=0.0)
         x = x - x[0]
         ax.plot(np.where(standing, np.nan, x), z, color=BLACK, lw=1.0)
         ax.plot(np.where(standing, x, np.nan), z, color=VERMILION, lw=3.0)
@@ -160,8 +160,8 @@ def _figure_39(walks: Walks, number: int) -> Explained:
         claim('of 40 60 and', (low, middle, high), low > middle > high,
               times=(low, middle, high)),
     )  # fmt: skip
-    words = [f'{"never" if t is None else f"{t:.1f} s"} ({RAIL[n][0]})' for n, t in times.items()]
-    return explained(number, figure, claims, times=', '.join(words))
+    shown = [f'{"never" if t is None else f"{t:.1f} s"} ({RAIL[n][0]})' for n, t in times.items()]
+    return explained(number, figure, claims, times=', '.join(shown))
 
 
 # --- the hexapod ---------------------------------------------------------------------------------
