@@ -11,7 +11,6 @@ import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -209,7 +208,7 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
         results = study.measure(lambda share: reach(100.0 * share), **chosen)
     with bar(f'{name}: drawing', 100.0, '%') as reach:
         pictures = study.figures(results, lambda share: reach(100.0 * share))
-    rows = [asdict(result) for result in results]
+    rows = [vars(result) for result in results]
     write(folder, name, {'rows': rows}, pictures)
     if options.json:
         print(json.dumps(rows))

@@ -17,7 +17,6 @@ Slip counts from when they see the base walk.
 
 from __future__ import annotations
 
-import dataclasses
 import pathlib
 from collections.abc import Sequence
 from typing import Any
@@ -57,26 +56,8 @@ SHARED = 0.85
 """Least share of the poses that must lie within the readings."""
 
 
-@dataclasses.dataclass
-class Row:
-    """Figures of one method on one recording, SI units; NaN where it has none."""
-
-    recording: str
-    method: str
-    readings: int
-    duration: float
-    path: float
-    clock: tuple[float, float]  # start, s, and rate, Hz, of the cameras' clock
-    position_error: float
-    velocity_error: float
-    coverage: float  # share of velocity errors within 2 deviations
-    slip_median: float
-    slip_most: float  # 95 % quantile
-    slip_coverage: float  # share of slips within 2 deviations of zero
-    flagged: float
-    alarms: int
-    minutes: float  # of settled stance, walking
-    doubt: float
+Row = dict[str, Any]
+"""Figures of one method on one recording, SI units; NaN where it has none."""
 
 
 def log_of(recording: Recording) -> Log:
@@ -193,14 +174,18 @@ def measure(recording: Recording) -> list[Row]:
         error = (mean - velocity)[:, :2]
         deviation = _at(at, time, track.deviation)[apart // 2 :][: len(error)]
         rows.append(
-            Row(
-                *(recording.name, method, len(time), float(time[-1]), path),
-                clock=(start, rate),
-                position_error=rms((places - seen)[:, :2]),
-                velocity_error=rms(error),
-                coverage=_share(np.abs(error) / deviation),
+            {
+                'recording': recording.name,
+                'method': method,
+                'readings': len(time),
+                'duration': float(time[-1]),
+                'path': path,
+                'clock': (start, rate),
+                'position_error': rms((places - seen)[:, :2]),
+                'velocity_error': rms(error),
+                'coverage': _share(np.abs(error) / deviation),
                 **slips(track, recording.rate, walks),
-            )
+            }
         )
     return rows
 
@@ -267,6 +252,5 @@ def main(words: Sequence[str]) -> int:
         raise InvalidInput(f'a folder is needed: {sources}')
     found = [read(folder) for read, folder in folders]
     rows = [row for each in command.each(found, 'foreign', 'robot') for row in measure(each)]
-    kept = [dataclasses.asdict(row) for row in rows]
-    command.show(options, kept, command.listed(kept))
+    command.show(options, rows, command.listed(rows))
     return 0

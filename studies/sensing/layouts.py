@@ -22,15 +22,9 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from studies.sensing.walks import Course, Log, walk
 
-_TEXT = pathlib.Path(__file__).with_suffix('.msg').read_text('utf-8')
+_PARTS = pathlib.Path(__file__).with_suffix('.msg').read_text('utf-8').split('>>> ')[1:]
 DEFINITIONS = {
-    name: text.rstrip('\n')
-    for name, _, text in (
-        part.partition('\n')
-        for part in (pathlib.Path(__file__).with_suffix('.msg').read_text('utf-8')).split('>>> ')[
-            1:
-        ]
-    )
+    name: text.rstrip('\n') for name, _, text in (part.partition('\n') for part in _PARTS)
 }
 """Layouts of messages, by type, of layouts.msg."""
 
@@ -151,26 +145,6 @@ def spot_feet(log: Log, robot: Robot) -> Iterator[tuple[str, str, Any, int]]:
             state.contact = 1 if log.foot_forces[tick, leg, 2] > LOAD else 2
             message.states.append(state)
         yield '/status/feet', 'spot_msgs/msg/FootStateArray', message, stamp
-
-
-def champ_contacts(log: Log) -> Iterator[tuple[str, str, Any, int]]:
-    """Yield champ_msgs/ContactsStamped."""
-    for stamp, forces in zip(stamps(log), log.foot_forces, strict=True):
-        message = blank('champ_msgs/msg/ContactsStamped', stamp)
-        message.contacts = forces[:, 2] > LOAD
-        yield '/foot_contacts', 'champ_msgs/msg/ContactsStamped', message, stamp
-
-
-def anymal_state(log: Log, names: Sequence[str]) -> Iterator[tuple[str, str, Any, int]]:
-    """Yield anymal_msgs/AnymalState."""
-    for tick, stamp in enumerate(stamps(log)):
-        message = blank('anymal_msgs/msg/AnymalState', stamp)
-        message.joints.name = list(names)
-        message.joints.position = log.joint_positions[tick]
-        message.joints.velocity = log.joint_velocities[tick]
-        message.joints.effort = log.efforts[tick]
-        topic = '/state_estimator/anymal_state'
-        yield topic, 'anymal_msgs/msg/AnymalState', message, stamp
 
 
 def feet_in_body(robot: Robot, log: Log, tick: int) -> tuple[Array, Array]:

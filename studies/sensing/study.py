@@ -14,7 +14,6 @@ and .png.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -38,28 +37,8 @@ SLIPS, STICKS = 0.01, 0.005  # m/s
 SETTLED, RECENT, WINDOW = 0.024, 0.06, 0.02  # s
 
 
-@dataclasses.dataclass
-class Row:
-    """Figures of one method on one walk, SI units."""
-
-    course: str
-    seed: int
-    method: str
-    path: float
-    velocity_error: float
-    vertical_error: float
-    drift: float
-    slip_error: float
-    ratio: float
-    coverage: float
-    slip_coverage: float
-    flagged: float
-    doubt: float
-    seconds: float
-    missed: dict[str, tuple[int, int]]
-    false_alarms: float
-    latency: float
-    slipped: float
+Row = dict[str, Any]
+"""Figures of one method on one walk, SI units."""
 
 
 def alarms_of(track: Track, rate: float) -> Flags:
@@ -154,20 +133,20 @@ def measure(name: str, seed: int, duration: float) -> list[Row]:
         slip = track.slip - true_slip
         inside = np.abs(slip) < 2.0 * track.slip_deviation[..., None]
         rows.append(
-            Row(
-                *(name, seed, method, path),
-                velocity_error=float(np.sqrt((error**2).sum(1).mean())),
-                vertical_error=float(np.sqrt((every[:, 2] ** 2).mean())),
-                drift=float(np.linalg.norm(moved[:2]) / path),
-                slip_error=float(np.sqrt((slip[sticks] ** 2).sum(1).mean())),
-                ratio=float(np.sqrt((scaled**2).mean())),
-                coverage=float((np.abs(scaled) < 2.0).mean()),
-                slip_coverage=float(inside[within].mean()),
-                flagged=float(track.slipping[sticks].mean()),
-                doubt=float(track.doubt[walking].mean()),
-                seconds=track.seconds,
-                **judge_alarms(track, log, walking, rate),
-            )
+            {'course': name, 'seed': seed, 'method': method, 'path': path}
+            | {
+                'velocity_error': float(np.sqrt((error**2).sum(1).mean())),
+                'vertical_error': float(np.sqrt((every[:, 2] ** 2).mean())),
+                'drift': float(np.linalg.norm(moved[:2]) / path),
+                'slip_error': float(np.sqrt((slip[sticks] ** 2).sum(1).mean())),
+                'ratio': float(np.sqrt((scaled**2).mean())),
+                'coverage': float((np.abs(scaled) < 2.0).mean()),
+                'slip_coverage': float(inside[within].mean()),
+                'flagged': float(track.slipping[sticks].mean()),
+                'doubt': float(track.doubt[walking].mean()),
+                'seconds': track.seconds,
+            }
+            | judge_alarms(track, log, walking, rate)
         )
     return rows
 
@@ -179,17 +158,17 @@ def summary(rows: Sequence[Row]) -> str:
     slip.
     """
     lines = ['| walk | ' + ' | '.join(METHODS) + ' |', '|---' * (len(METHODS) + 1) + '|']
-    for name in dict.fromkeys(row.course for row in rows):
+    for name in dict.fromkeys(row['course'] for row in rows):
         cells = [name]
         for method in METHODS:
-            some = [row for row in rows if (row.course, row.method) == (name, method)]
-            error, drift = np.mean([(row.velocity_error, row.drift) for row in some], axis=0)
+            some = [row for row in rows if (row['course'], row['method']) == (name, method)]
+            error, drift = np.mean([(row['velocity_error'], row['drift']) for row in some], axis=0)
             cells.append(f'{1e3 * error:.1f}; {1e2 * drift:.2f}')
         lines.append('| ' + ' | '.join(cells) + ' |')
-    for name in dict.fromkeys(row.course for row in rows):
-        own = [row for row in rows if (row.course, row.method) == (name, METHODS[0])]
-        missed = {k: np.sum([row.missed[k] for row in own], axis=0) for k in own[0].missed}
-        mean = {k: np.mean([getattr(row, k) for row in own]) for k in ('coverage', 'false_alarms')}
+    for name in dict.fromkeys(row['course'] for row in rows):
+        own = [row for row in rows if (row['course'], row['method']) == (name, METHODS[0])]
+        missed = {k: np.sum([row['missed'][k] for row in own], axis=0) for k in own[0]['missed']}
+        mean = {k: np.mean([row[k] for row in own]) for k in ('coverage', 'false_alarms')}
         lines.append(
             f'{name}: in 2 sd {mean["coverage"]:.2f}, false alarms a minute'
             f' {mean["false_alarms"]:.1f}, missed '
@@ -215,16 +194,15 @@ def main(words: Sequence[str]) -> int:
         for name, seed in command.each(cases, 'sensing', 'walk')
         for row in measure(name, seed, float(options.duration))
     ]
-    kept = [dataclasses.asdict(row) for row in rows]
     shown = summary(rows)
     if options.picture:
-        picture = chart.picture(kept, METHODS)
-        command.write(options.out, 'sensing', {'rows': kept}, {'sensing': picture})
+        picture = chart.picture(rows, METHODS)
+        command.write(options.out, 'sensing', {'rows': rows}, {'sensing': picture})
     if options.all:
         found = stability.measure(seeds)
         shown += f'\n\n{stability.summary(found)}'
         name, document = 'sensing_stability', {'curves': [vars(each) for each in found]}
         if options.picture:
             command.write(options.out, name, document, {name: chart.stability(found)})
-    command.show(options, kept, shown)
+    command.show(options, rows, shown)
     return 0

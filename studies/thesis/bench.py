@@ -8,6 +8,7 @@ are checked here; where the thesis gives nothing to check, the result of the mod
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import itertools
 import os
 from collections.abc import Mapping, Sequence
@@ -20,9 +21,9 @@ from ros_pad.contact.calibrate import stiffness_of
 from ros_pad.contact.dome import MODELS, inflate, press
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import LARGE_PAD, Array
-from ros_pad.errors import ConfigError, NoEquilibrium
-from studies.thesis.bench_scene import BenchScene, FootBench, InflationBench, PressBench
-from studies.thesis.explained import MINIMAL, Claim, Omission, claim, left_out, notes
+from ros_pad.errors import ConfigError
+from studies.thesis.bench_scene import BenchScene
+from studies.thesis.explained import MINIMAL, Claim, Omission, claim, left_out, notes, worded
 
 FIDELITY = 'analytic'
 
@@ -74,8 +75,8 @@ class Row:
     pressure: float | None
     force: float | None
     modelled: float
-    measured: float | None
-    claimed: str
+    measured: float | None = None
+    claimed: str = NOT_CODED
 
     @property
     def error(self) -> float | None:
@@ -96,7 +97,7 @@ class BenchTrial:
     Attributes
     ----------
     scene : BenchScene
-    rows : tuple of Row
+    rows : sequence of Row
     claims : tuple of Claim
     curves : mapping of str to Curve
         Curves of the figures, by name.
@@ -107,7 +108,7 @@ class BenchTrial:
     """
 
     scene: BenchScene
-    rows: tuple[Row, ...]
+    rows: Sequence[Row]
     claims: tuple[Claim, ...]
     curves: Mapping[str, Curve]
     notes: tuple[str, ...]
@@ -147,51 +148,57 @@ def run(scene: BenchScene | str | os.PathLike[str]) -> BenchTrial:
     """
     if not isinstance(scene, BenchScene):
         scene = BenchScene.load(scene)
-    measured = Measurements.read(scene.measurements)
-    if isinstance(scene.setup, InflationBench):
-        return _inflation(scene, scene.setup, measured)
-    if isinstance(scene.setup, PressBench):
-        return _press(scene, scene.setup, measured)
-    if isinstance(scene.setup, FootBench):
-        from studies.thesis import foot_bench
+    if scene.kind in _HERE:
+        return _HERE[scene.kind](scene)
+    name = {'foot': 'foot_bench', 'tangential': 'tangential'}[scene.kind]
+    trial: BenchTrial = importlib.import_module(f'studies.thesis.{name}').compute(scene)
+    return trial
 
-        return foot_bench.compute(scene, scene.setup)
-    from studies.thesis import tangential
 
-    return tangential.compute(scene, scene.setup, measured)
+def measured(scene: BenchScene, kind: str, words: str) -> list[Array]:
+    """Return the columns of a kind of measurement, by rising first column.
 
+    Raises
+    ------
+    ConfigError
+        When there are none; ``words`` say of what.
+    """
+    columns = np.array(getattr(Measurements.read(scene.measurements), kind))[:5]
+    if kind == 'pressed':  # the gap beside these is height less depth
+        mine = np.isclose(columns[0], scene.setup.pressure, rtol=1e-9)
+        columns = columns[:, mine & np.isfinite(columns).all(axis=0)]
+    if not columns.size:
+        raise ConfigError(f'{scene.source}: {scene.measurements} has no {words}')
+    return list(columns[:, np.argsort(columns[0], kind='stable')])
+
+
+_FREE = 'free', 'free domes (pressure, height)'
 
 # --- inflation: figures 14 and 15 ----------------------------------------------------------------
 
 
-def _inflation(scene: BenchScene, setup: InflationBench, measured: Measurements) -> BenchTrial:
-    pad = scene.pad
-    pressures, heights = _free_points(scene, measured)
+def _inflation(scene: BenchScene) -> BenchTrial:
+    pad, setup = scene.pad, scene.setup
+    pressures, heights = measured(scene, *_FREE)
     model = inflate(pad, pressures)
     claimed = f'±{100.0 * setup.claimed_error:g} %'
     stiffness = stiffness_of(pad, pressures, heights)
+    same = np.full(heights.shape, pad.stiffness)
+    columns = {
+        ('height', 'm', claimed): (model.height, heights),
+        ('sphere radius', 'm', claimed): (model.sphere_radius, _sphere(pad.radius, heights)),
+        ('stiffness', 'N/m', 'rises with deformation'): (same, stiffness),
+    }
     rows = [
-        Row(15, quantity, unit, 'thesis', 'free', p, 0.0, own, found, claim)
-        for quantity, unit, modelled, measurement, claim in (
-            ('height', 'm', model.height, heights, claimed),
-            ('sphere radius', 'm', model.sphere_radius, _sphere(pad.radius, heights), claimed),
-            (
-                'stiffness',
-                'N/m',
-                np.full(heights.shape, pad.stiffness),
-                stiffness,
-                'rises with deformation',
-            ),
-        )
-        for p, own, found in zip(
-            pressures.tolist(), modelled.tolist(), measurement.tolist(), strict=True
-        )
+        Row(15, quantity, unit, 'thesis', 'free', p, 0.0, own, found, stated)
+        for (quantity, unit, stated), values in columns.items()
+        for p, own, found in np.array([pressures, *values]).T.tolist()
     ]
     p = np.linspace(0.0, setup.highest_pressure, _POINTS)
     curve = inflate(pad, p)
     return BenchTrial(
         scene,
-        tuple(rows),
+        rows,
         _inflation_claims(setup, rows, stiffness),
         {'height': Curve(p, curve.height), 'sphere radius': Curve(p[1:], curve.sphere_radius[1:])},
         notes('inflation', k=pad.stiffness),
@@ -199,44 +206,21 @@ def _inflation(scene: BenchScene, setup: InflationBench, measured: Measurements)
     )
 
 
-def _inflation_claims(
-    setup: InflationBench, rows: Sequence[Row], stiffness: Array
-) -> tuple[Claim, ...]:
+def _inflation_claims(setup: Any, rows: Sequence[Row], stiffness: Array) -> tuple[Claim, ...]:
     error = errors(pick(rows, 'height'))
-    within = int(np.sum(np.abs(error) <= setup.claimed_error))
+    size, height = np.abs(error), float(inflate(LARGE_PAD, 75e3).height)
+    within = int(np.sum(size <= setup.claimed_error))
     return (
-        claim(
-            'outline of the free',
-            f'{1e3 * inflate(LARGE_PAD, 75e3).height:.16g} mm high.',
-            (float(inflate(LARGE_PAD, 75e3).height),),
-            bool(abs(inflate(LARGE_PAD, 75e3).height / PRINTED_HEIGHT - 1.0) < 1e-15),
-        ),
-        claim(
-            'calculated heights and radii',
-            f'Height: {percents(error)}; sphere radius: '
-            f'{percents(errors(pick(rows, "sphere radius")))} ({len(error)} domes, each '
-            f'measured once). {within} of {len(error)} heights are within.',
-            tuple(error.tolist()),
-            within == len(error),
-            printed=f'±{100.0 * setup.claimed_error:g} %',
-        ),
-        claim(
-            'errors grow with pressure',
-            f'{percents(np.abs(error), sign=False)}: '
-            + ('they do.' if rises(np.abs(error)) else 'they do not.'),
-            tuple(np.abs(error).tolist()),
-            rises(np.abs(error)),
-        ),
-        claim(
-            'the stiffness k grows',
-            'The k that gives each measured height '
-            + ('rises: ' if rises(stiffness) else 'falls: ' if rises(-stiffness) else 'is: ')
-            + ', '.join(f'{k:.2f}' for k in stiffness)
-            + ' N/m.',
-            tuple(stiffness.tolist()),
-            rises(stiffness),
-        ),
-    )
+        claim('outline of the free', height, abs(height / PRINTED_HEIGHT - 1.0) < 1e-15,
+              height=1e3 * height),
+        claim('calculated heights and radii', error, within == len(error), within=within,
+              error=error, radius=errors(pick(rows, 'sphere radius')), count=len(error),
+              claimed=setup.claimed_error),
+        claim('errors grow with pressure', size, rises(size), size=size,
+              verdict='they do' if rises(size) else 'they do not'),
+        claim('the stiffness k grows', stiffness, rises(stiffness), stiffness=stiffness,
+              way='rises' if rises(stiffness) else 'falls' if rises(-stiffness) else 'is'),
+    )  # fmt: skip
 
 
 # --- press: figures 16 to 18 ---------------------------------------------------------------------
@@ -249,31 +233,37 @@ _PRESSED = (
     (18, 'contact radius', 'contact_radius'),
     (18, 'depth', 'depth'),
 )
+_AGREEMENTS = (
+    # figure, what is compared, its rows
+    (16, 'outline', ('height', 'gap')),
+    (17, 'height and sphere radius', ('height', 'sphere radius')),
+    (18, 'contact radius and depth', ('contact radius', 'depth')),
+)
 CODED, TEXT = 'force as coded', 'force as in the text'
 
 
-def _press(scene: BenchScene, setup: PressBench, measured: Measurements) -> BenchTrial:
-    pressure = setup.pressure
-    forces, points = _pressed_points(scene, setup, measured)
+def _press(scene: BenchScene) -> BenchTrial:
+    pressure = scene.setup.pressure
+    forces, points = _pressed_points(scene)
     readings = {CODED: forces}
-    if setup.text_forces:
-        if len(setup.text_forces) != len(forces):
+    if text := scene.setup.text_forces:
+        if len(text) != len(forces):
             raise ConfigError(
-                f'{scene.source}: text_forces: {len(setup.text_forces)} forces, but '
-                f'{len(forces)} pressed points in {scene.measurements}: equal numbers are needed'
+                f'{scene.source}: text_forces: {len(text)} forces, but {len(forces)} pressed '
+                f'points in {scene.measurements}: equal numbers are needed'
             )
-        readings[TEXT] = np.array(setup.text_forces)
-    rows, curves = _press_rows(scene, setup, readings, points)
-    free_pressure, free_height = _free_points(scene, measured)
-    top = inflate(scene.pad, pressure).height
+        readings[TEXT] = np.array(text)
+    rows, curves = _press_rows(scene, readings, points)
+    top = float(inflate(scene.pad, pressure).height)
     rows += [  # figure 16 shows the free dome, too
-        Row(16, 'free height', 'm', 'thesis', 'free', pressure, 0.0, top, found, NO_ERROR)
-        for found in free_height[np.isclose(free_pressure, pressure, rtol=1e-9)].tolist()
+        Row(16, 'free height', 'm', 'thesis', 'free', pressure, 0.0, top, height, NO_ERROR)
+        for p, height in np.transpose(measured(scene, *_FREE)).tolist()
+        if np.isclose(p, pressure, rtol=1e-9)
     ]
     sphere, exact = (modelled(pick(rows, 'gap', model)) for model in MODELS)
     return BenchTrial(
         scene,
-        tuple(rows),
+        rows,
         _press_claims(rows, readings, points, pressure),
         curves,
         notes('press'),
@@ -282,32 +272,23 @@ def _press(scene: BenchScene, setup: PressBench, measured: Measurements) -> Benc
 
 
 def _press_rows(
-    scene: BenchScene,
-    setup: PressBench,
-    readings: Mapping[str, Array],
-    points: Mapping[str, Array],
+    scene: BenchScene, readings: Mapping[str, Array], points: Mapping[str, Array]
 ) -> tuple[list[Row], dict[str, Curve]]:
     """Return rows for the measured points with each version of the forces, and the curves."""
-    pad, pressure = scene.pad, setup.pressure
-    rows = []
+    pad, pressure = scene.pad, scene.setup.pressure
+    load = np.linspace(0.0, scene.setup.highest_force, _POINTS)[1:]
+    press(pad, pressure, max(load[-1], *map(max, readings.values())))  # raises if it is too much
+    rows, curves = [], {}
     for model, (condition, loads) in itertools.product(MODELS, readings.items()):
         shapes = press(pad, pressure, loads, model=model)
-        _all_stand(scene, setup, shapes.status, loads)
         for figure, quantity, name in _PRESSED:
+            columns = np.array([loads, getattr(shapes, name), points[quantity]])
             rows += [
                 Row(figure, quantity, 'm', model, condition, pressure, force, own, found, NO_ERROR)
-                for force, own, found in zip(
-                    loads.tolist(),
-                    getattr(shapes, name).tolist(),
-                    points[quantity].tolist(),
-                    strict=True,
-                )
+                for force, own, found in columns.T.tolist()
             ]
-    load = np.linspace(0.0, setup.highest_force, _POINTS)[1:]
-    curves = {}
     for model in MODELS:
         shapes = press(pad, pressure, load, model=model)
-        _all_stand(scene, setup, shapes.status, load)
         for _, quantity, name in _PRESSED:
             curves[f'{quantity}, {model}'] = Curve(load, getattr(shapes, name))
     return rows, curves
@@ -322,130 +303,56 @@ def _press_claims(
     coded, text = readings[CODED], readings.get(TEXT, readings[CODED])
     contact, sphere = points['contact radius'], points['sphere radius']
     carried = {condition: loads / (np.pi * contact**2) for condition, loads in readings.items()}
+    kilopascals = [
+        worded('{p:.0f} kPa ({condition})', p=1e-3 * p, condition=condition)
+        for condition, p in carried.items()
+    ]
     odd = points['depth'] * (sphere + np.sqrt(sphere**2 - contact**2)) / contact**2 - 1.0
     exact = pick(rows, 'gap', 'membrane', CODED)
     gap = errors(pick(rows, 'gap', 'thesis', CODED))
     high = modelled(pick(rows, 'gap', 'thesis', CODED)) / modelled(exact) - 1.0
     domes = f'{len(coded)} domes, each measured once'
     claims = (
-        claim(
-            'normal forces on the',
-            f'The program of the appendix has {numbers(coded, "g")} N: '
-            f'{percents(coded / text - 1.0)}. Measured points are compared with these.',
-            tuple(coded.tolist()),
-            True if np.allclose(text, coded, rtol=1e-3) else None,
-            printed=f'{numbers(text, "g")} N',
-        ),
-        *(_agreement(rows, domes, *each) for each in _PRESSED_POINTS),
-        claim(
-            'the wall of the',
-            'The gap of the sphere differs from that of the exact membrane of the same energy by '
-            f'{percents(high)}; from the measured gap the sphere differs by {percents(gap)}, '
-            f'the membrane by {percents(errors(exact))} ({domes}): where the sphere is nearer, '
-            'its error compensates another.',
-            tuple(high.tolist()),
-            bool(np.all(np.abs(high) <= MINIMAL)),
-        ),
-        claim(
-            'the contact carries the',
-            f'Load over measured contact area, against {1e-3 * pressure:g} kPa: '
-            + '; '.join(f'{numbers(1e-3 * p, ".0f")} kPa ({c})' for c, p in carried.items())
-            + f' ({domes}).',
-            tuple(carried[CODED].tolist()),
-            bool(np.all(np.abs(carried[CODED] / pressure - 1.0) <= MINIMAL)),
-        ),
-        claim(
-            'height contact radius and',
-            'The depth in the program differs from that of the sphere with the height and contact '
-            f'radius there by {percents(odd)} ({domes}).',
-            tuple(odd.tolist()),
-            bool(np.all(np.abs(odd) <= ON_ONE_SPHERE)),
-        ),
-    )
+        claim('normal forces on the', coded, True if np.allclose(text, coded, rtol=1e-3) else None,
+              coded=coded, text=text, off=coded / text - 1.0),
+        *(_agreement(rows, domes, *each) for each in _AGREEMENTS),
+        claim('the wall of the', high, np.all(np.abs(high) <= MINIMAL), high=high, gap=gap,
+              exact=errors(exact), domes=domes),
+        claim('the contact carries the', carried[CODED],
+              np.all(np.abs(carried[CODED] / pressure - 1.0) <= MINIMAL), domes=domes,
+              pressure=1e-3 * pressure, carried='; '.join(kilopascals)),
+        claim('height contact radius and', odd, np.all(np.abs(odd) <= ON_ONE_SPHERE), odd=odd,
+              domes=domes),
+    )  # fmt: skip
     return claims if TEXT in readings else claims[1:]
-
-
-_PRESSED_POINTS = (
-    # figure, what is compared, its rows
-    (16, 'outline', ('height', 'gap')),
-    (17, 'height and sphere radius', ('height', 'sphere radius')),
-    (18, 'contact radius and depth', ('contact radius', 'depth')),
-)
 
 
 def _agreement(
     rows: Sequence[Row], domes: str, figure: int, what: str, quantities: Sequence[str]
 ) -> Claim:
     error = {each: errors(pick(rows, each, 'thesis', CODED)) for each in quantities}
-    found = np.concatenate(list(error.values()))
+    texts = [worded('{0} {error:+z.1f%}', each, error=e) for each, e in error.items()]
     return claim(
-        'calculated outline of pressed',
-        '; '.join(f'{each} {percents(values)}' for each, values in error.items()) + f' ({domes}).',
-        tuple(found.tolist()),
-        None,
-        figure=figure,
-        thesis=f'Calculated {what} of pressed domes beside measured ones.',
-    )
+        'calculated outline of pressed', [*error.values()], None,
+        figure=figure, what=what, errors='; '.join(texts), domes=domes,
+    )  # fmt: skip
 
 
-# --- measurements, and numbers as text -----------------------------------------------------------
+# --- measurements, and numbers -------------------------------------------------------------------
 
 
-def _free_points(scene: BenchScene, measured: Measurements) -> tuple[Array, Array]:
-    """Return pressures and heights of the free domes, by rising pressure."""
-    found = measured.free
-    _some(scene, len(found.pressure), 'free domes (pressure, height)')
-    order = np.argsort(found.pressure)
-    return found.pressure[order], found.height[order]
-
-
-def _pressed_points(
-    scene: BenchScene, setup: PressBench, measured: Measurements
-) -> tuple[Array, dict[str, Array]]:
+def _pressed_points(scene: BenchScene) -> tuple[Array, dict[str, Array]]:
     """Return the forces at the bench's pressure, and the values measured under each."""
-    found = measured.pressed
-    mine = np.isclose(found.pressure, setup.pressure, rtol=1e-9)
-    for name in ('height', 'depth', 'contact_radius'):
-        mine &= np.isfinite(getattr(found, name))
-    _some(
-        scene,
-        int(mine.sum()),
-        f'pressed domes of {setup.pressure:g} Pa (force, height, depth, contact_radius)',
-    )
-    height, depth = found.height[mine], found.depth[mine]
-    return found.force[mine], {
+    words = 'pressed domes of {:g} Pa (force, height, depth, contact_radius)'
+    columns = measured(scene, 'pressed', words.format(scene.setup.pressure))
+    _, force, height, depth, contact = columns
+    return force, {
         'height': height,
         'sphere radius': _sphere(scene.pad.radius, height),
-        'contact radius': found.contact_radius[mine],
+        'contact radius': contact,
         'depth': depth,
         'gap': height - depth,
     }
-
-
-def limit_points(scene: BenchScene, measured: Measurements) -> tuple[Array, Array]:
-    """Return pressures and measured force limits, by rising pressure."""
-    found = measured.force_limits
-    _some(scene, len(found.pressure), 'force limits (pressure, force_limit)')
-    order = np.argsort(found.pressure)
-    return found.pressure[order], found.force_limit[order]
-
-
-def _some(scene: BenchScene, count: int, what: str) -> None:
-    if not count:
-        raise ConfigError(f'{scene.source}: {scene.measurements} has no {what}')
-
-
-def _all_stand(
-    scene: BenchScene, setup: PressBench, status: np.ndarray[Any, Any], loads: Array
-) -> None:
-    """Raise NoEquilibrium if a load of the scene has no dome."""
-    bad = status != 'ok'
-    if bad.any():
-        raise NoEquilibrium(
-            f'{scene.source}: at {setup.pressure:g} Pa the pad has no dome under '
-            f'{loads[bad][0]:g} N ({status[bad][0]})',
-            str(status[bad][0]),
-        )
 
 
 def pick(
@@ -474,13 +381,4 @@ def rises(values: Array) -> bool:
     return bool(np.all(np.diff(values) > 0.0))
 
 
-def percents(values: Array, sign: bool = True) -> str:
-    return join([f'{100.0 * v:{"+" if sign else ""}z.1f} %'.replace('-', '−') for v in values])
-
-
-def numbers(values: Sequence[float] | Array, form: str) -> str:
-    return join([f'{value:{form}}' for value in values])
-
-
-def join(words: list[str]) -> str:
-    return ' and '.join([', '.join(words[:-1]), words[-1]] if len(words) > 1 else words)
+_HERE = {'inflation': _inflation, 'press': _press}

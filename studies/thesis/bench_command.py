@@ -66,17 +66,12 @@ def main(words: Sequence[str]) -> int:
 
 def _table(trial: bench.BenchTrial) -> str:
     scene = trial.scene
-    lines = [list(page.HEAD), *(page.cells(row) for row in trial.rows)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(page.HEAD))]
-    shown = [f'{scene.name}, {bench.FIDELITY}: {scene.description}', '']
-    for line in lines:
-        shown.append('  '.join(map(str.ljust, line, widths)).rstrip())
+    rows = [dict(zip(page.HEAD, page.cells(row), strict=True)) for row in trial.rows]
+    shown = [command.listed(rows, f'{scene.name}, {bench.FIDELITY}: {scene.description}')]
     shown += ['', f'Statements of the thesis: {counted(trial.claims)}.']
     for claim in trial.claims:
         shown += ['', f'{claim.where}: {claim.verdict}', f'  thesis  {claim.thesis}']
         shown += [f'  here    {claim.ours}', f'  rule    {claim.reason()}']
     shown += ['', *(f'note:     {note}' for note in trial.notes)]
-    for omission in trial.omitted:
-        bound = '' if omission.bound is None else f' (at most {100 * omission.bound:.2g} %)'
-        shown.append(f'left out: {omission.term}{bound}: {omission.reason}')
+    shown += [f'left out: {" ".join(omission.words())}' for omission in trial.omitted]
     return '\n'.join(shown)

@@ -7,6 +7,7 @@ it.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -34,7 +35,6 @@ from ros_pad.reports.style import (
 )
 from studies.drawing import ORANGE, PURPLE
 from studies.thesis.bench import CODED, TEXT, BenchTrial, Row
-from studies.thesis.bench_scene import InflationBench, TangentialBench
 from studies.thesis.explained import drawn
 from studies.thesis.foot_bench import DOME, FLAT, LINES, NONE, ROUGH, SMOOTH, SUCTION
 from studies.thesis.tangential import CAPILLARY, DRY, RISE, WET, shape_name
@@ -48,7 +48,7 @@ def draw(trial: BenchTrial) -> dict[int, Drawn]:
 
     Save them under ``matplotlib.rc_context(PAPER_STYLE)``, which sets fonts and identifiers.
     """
-    makers = _FIGURES[trial.scene.setup.kind]
+    makers = _FIGURES[trial.scene.kind]
     with matplotlib.rc_context(PAPER_STYLE):
         return {number: make(trial) for number, make in makers.items()}
 
@@ -81,35 +81,47 @@ def figure_14(trial: BenchTrial) -> Drawn:
     ax.set_aspect('equal')
     ax.set(xlabel='x / mm', ylabel='z / mm', ylim=(-0.05, None))
     legend(figure, handles, columns=3)
-    text = _listed(rows, 'measured {measured:.2f} mm, model {modelled:.2f} mm')
-    return drawn(14, figure, alt=f'Profiles of free domes: {text}')
+    return drawn(14, figure, domes=_listed(rows, lambda row: (
+        f'measured {1e3 * (row.measured or 0.0):.2f} mm, model {1e3 * row.modelled:.2f} mm'
+    )))  # fmt: skip
 
 
 def figure_15(trial: BenchTrial) -> Drawn:
     """Draw height and radius of free domes over pressure with their errors, and the stiffness."""
     setup = trial.scene.setup
-    assert isinstance(setup, InflationBench)
     figure = Figure(figsize=(WIDE, 2.9), layout='constrained')
     axes = figure.subplots(1, 3)
     heights, stiffness = trial.pick('height'), trial.pick('stiffness')
-    low = 0.75 * min(_pressures(heights))  # kPa; at 0 the sphere radius is infinite
+    low = 0.75 * min(_column(heights, 'pressure', 1e-3))  # kPa; at 0 the sphere radius is infinite
     for ax, letter, quantity in zip(axes, 'ab', ('height', 'sphere radius'), strict=False):
         curve, rows = trial.curves[quantity], trial.pick(quantity)
         shown = curve.x >= 1e3 * low
         ax.plot(1e-3 * curve.x[shown], 1e3 * curve.y[shown], color=BLUE)
-        _points(ax, rows, _pressures(rows), 1e3 * _found(rows), [_percent(row) for row in rows])
+        _points(
+            ax,
+            rows,
+            _column(rows, 'pressure', 1e-3),
+            _column(rows, 'measured', 1e3),
+            [_percent(row) for row in rows],
+        )
         ax.set(title=f'({letter}) {quantity}', ylabel=f'{quantity} / mm')
         ax.set_xlim(low, 1e-3 * setup.highest_pressure)
     axes[2].axhline(stiffness[0].modelled, color=BLUE)
-    values = _found(stiffness)
-    _points(axes[2], stiffness, _pressures(stiffness), values, [f'{k:.2f}' for k in values])
+    values = _column(stiffness, 'measured')
+    _points(
+        axes[2],
+        stiffness,
+        _column(stiffness, 'pressure', 1e-3),
+        values,
+        [f'{k:.2f}' for k in values],
+    )
     axes[2].set(title='(c) stiffness of each height', ylabel='k / (N/m)')
     for ax in axes:
         ax.set_xlabel('gauge pressure / kPa')
         ax.margins(y=0.25)
     model = _key(f'model, k = {stiffness[0].modelled:g} N/m', color=BLUE)
     legend(figure, [model, _key('measured', color=VERMILION, marker='o')])
-    return drawn(15, figure, alt='Errors of the height: ' + _listed(heights, '{percent:+.1f} %'))
+    return drawn(15, figure, errors=_listed(heights, _percent))
 
 
 def _points(ax: Axes, rows: Sequence[Row], x: Array, y: Array, texts: Sequence[str]) -> None:
@@ -163,26 +175,12 @@ def figure_16(trial: BenchTrial) -> Drawn:
     ]
     legend(figure, handles)
     gaps = trial.pick('gap', 'thesis', CODED)
-    return drawn(
-        16,
-        figure,
-        alt='Profiles of pressed domes. Errors of the gap: '
-        + _listed(gaps, '{percent:+.1f} %', 'force'),
-        title=f'Figure 16: domes of {_kilopascals(gaps[0])}, pressed',
-    )
+    errors = _listed(gaps, _percent, 'force')
+    return drawn(16, figure, errors=errors, pressure=_kilopascals(gaps[0]))
 
 
-def figure_17(trial: BenchTrial) -> Drawn:
-    """Draw height and sphere radius of pressed domes over force."""
-    return _over_force(trial, 17, ('height', 'sphere radius'))
-
-
-def figure_18(trial: BenchTrial) -> Drawn:
-    """Draw contact radius, depth and gap of pressed domes over force."""
-    return _over_force(trial, 18, ('contact radius', 'depth', 'gap'))
-
-
-def _over_force(trial: BenchTrial, number: int, quantities: Sequence[str]) -> Drawn:
+def over_force(number: int, quantities: Sequence[str], trial: BenchTrial) -> Drawn:
+    """Draw some quantities of pressed domes over force."""
     figure = Figure(figsize=(WIDE, 3.1), layout='constrained')
     axes = figure.subplots(1, len(quantities), sharex=True)
     exact: dict[str, Any] = {'color': GREEN, 'ls': (0, (5, 1.5))}
@@ -192,11 +190,11 @@ def _over_force(trial: BenchTrial, number: int, quantities: Sequence[str]) -> Dr
             ax.plot(curve.x, 1e3 * curve.y, **look)
         coded = trial.pick(quantity, 'thesis', CODED)
         text = trial.pick(quantity, 'thesis', TEXT)
-        y = 1e3 * _found(coded)
+        y = _column(coded, 'measured', 1e3)
         if text:
-            ax.hlines(y, _forces(coded), _forces(text), color=VERMILION, lw=0.9)
-            ax.plot(_forces(text), y, 'o', color=VERMILION, mfc='white')
-        _points(ax, coded, _forces(coded), y, [_percent(row) for row in coded])
+            ax.hlines(y, _column(coded, 'force'), _column(text, 'force'), color=VERMILION, lw=0.9)
+            ax.plot(_column(text, 'force'), y, 'o', color=VERMILION, mfc='white')
+        _points(ax, coded, _column(coded, 'force'), y, [_percent(row) for row in coded])
         ax.set(title=f'({letter}) {quantity}', xlabel='normal force / N')
         ax.set_ylabel(f'{quantity} / mm')
         ax.margins(y=0.12)
@@ -209,8 +207,7 @@ def _over_force(trial: BenchTrial, number: int, quantities: Sequence[str]) -> Dr
     ]
     legend(figure, handles[: 4 if trial.pick(quantities[0], 'thesis', TEXT) else 3])
     rows = trial.pick(quantities[0], 'thesis', CODED)
-    errors = _listed(rows, '{percent:+.1f} %', 'force')
-    return drawn(number, figure, alt=f'Errors of the {quantities[0]}: {errors}')
+    return drawn(number, figure, errors=_listed(rows, _percent, 'force'))
 
 
 # --- tangential ----------------------------------------------------------------------------------
@@ -265,22 +262,12 @@ def figure_21(trial: BenchTrial) -> Drawn:
     ax.yaxis.set_major_formatter('{x:g}')
     ax.set(xlabel='gauge pressure / kPa', ylabel='capillary force / mN')
     legend(figure, ax.get_legend_handles_labels()[0], columns=2)
-    load = min(row.force for row in rows if row.force is not None)
-    return drawn(
-        21,
-        figure,
-        caption=f'Symbols: under {load:g} N, which all domes bear; strokes: under the measured '
-        'limit of each. The thesis states errors of 10 to 26 % against measurements whose numbers '
-        'it does not give; the versions of its estimate differ by far more. A ring that is the '
-        'same all round has no net tangential force: only hysteresis, up to the bound, can '
-        'resist.',
-    )
+    return drawn(21, figure, load=min(_column(rows, 'force')))
 
 
 def figure_10(trial: BenchTrial) -> Drawn:
     """Draw the height of rise between domes over the pad radius by each version of 3.101."""
     setup = trial.scene.setup
-    assert isinstance(setup, TangentialBench)
     figure = Figure(figsize=(COLUMN, 3.1), layout='constrained')
     ax = figure.subplots()
     ax.axvspan(1e3 * setup.claimed_smallest, 1e3 * setup.claimed_largest, color=STANCE, lw=0.0)
@@ -303,11 +290,7 @@ def figure_10(trial: BenchTrial) -> Drawn:
     ax.set_ylim(0.0, None)
     legend(figure, handles, columns=2)
     tops = ', '.join(f'{1e3 * row.modelled:.2f} mm ({row.model})' for row in best_rows)
-    return drawn(
-        10,
-        figure,
-        alt=f'Height of rise over pad radius by three versions of 3.101; greatest at {tops}',
-    )
+    return drawn(10, figure, tops=tops)
 
 
 # --- foot ----------------------------------------------------------------------------------------
@@ -348,7 +331,11 @@ def figure_34(trial: BenchTrial) -> Drawn:
 
 _FIGURES: dict[str, dict[int, Callable[[BenchTrial], Drawn]]] = {
     'inflation': {14: figure_14, 15: figure_15},
-    'press': {16: figure_16, 17: figure_17, 18: figure_18},
+    'press': {
+        16: figure_16,
+        17: functools.partial(over_force, 17, ('height', 'sphere radius')),
+        18: functools.partial(over_force, 18, ('contact radius', 'depth', 'gap')),
+    },
     'tangential': {20: figure_20, 21: figure_21, 10: figure_10},
     'foot': {34: figure_34},
 }
@@ -373,16 +360,10 @@ def _cap(
     return 1e3 * np.concatenate([-x, x[::-1]]), 1e3 * np.concatenate([z, z[::-1]])
 
 
-def _pressures(rows: Sequence[Row]) -> Array:
-    return np.array([1e-3 * row.pressure for row in rows if row.pressure is not None])
-
-
-def _forces(rows: Sequence[Row]) -> Array:
-    return np.array([row.force for row in rows if row.force is not None])
-
-
-def _found(rows: Sequence[Row]) -> Array:
-    return np.array([row.measured for row in rows if row.measured is not None])
+def _column(rows: Sequence[Row], name: str, factor: float = 1.0) -> Array:
+    """Return pressure, force or measured value of the rows that have one, times a factor."""
+    values = [getattr(row, name) for row in rows]
+    return np.array([factor * value for value in values if value is not None])
 
 
 def _percent(row: Row) -> str:
@@ -393,12 +374,7 @@ def _kilopascals(row: Row) -> str:
     return f'{1e-3 * (row.pressure or 0.0):g} kPa'
 
 
-def _listed(rows: Sequence[Row], form: str, by: str = 'pressure') -> str:
+def _listed(rows: Sequence[Row], words: Callable[[Row], str], by: str = 'pressure') -> str:
     """Return the rows as text, each with the pressure or force it belongs to."""
-    parts = []
-    for row in rows:
-        measured, percent = 1e3 * (row.measured or 0.0), 100.0 * (row.error or 0.0)
-        at = _kilopascals(row) if by == 'pressure' else f'{row.force:g} N'
-        words = form.format(modelled=1e3 * row.modelled, measured=measured, percent=percent)
-        parts.append(f'{words} at {at}')
-    return ', '.join(parts)
+    at = {'pressure': _kilopascals, 'force': lambda row: f'{row.force:g} N'}[by]
+    return ', '.join(f'{words(row)} at {at(row)}' for row in rows)

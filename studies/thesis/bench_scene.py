@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 import pathlib
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
 
 from ros_pad import configuration
 from ros_pad.configuration import Table
@@ -19,128 +19,7 @@ from ros_pad.contact.limits import criteria, force_limit
 from ros_pad.contact.pad import Pad, need_stiffness
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
-from ros_pad.simulation.scene import Scene, foot_of
-
-
-@dataclass(frozen=True)
-class InflationBench:
-    """Test in which a free pad is inflated (thesis 3.2.1).
-
-    Attributes
-    ----------
-    highest_pressure : float
-        Gauge pressure at which curves end, Pa.
-    claimed_error : float
-        Relative error of height and radius that the thesis states.
-    """
-
-    kind: ClassVar[str] = 'inflation'
-    highest_pressure: float
-    claimed_error: float
-
-
-@dataclass(frozen=True)
-class PressBench:
-    """Test in which an inflated pad is pressed on a plate (thesis 3.2.1).
-
-    Attributes
-    ----------
-    pressure : float
-        Gauge pressure, Pa.
-    highest_force : float
-        Normal force at which curves end, N.
-    text_forces : tuple of float
-        Normal forces that the thesis' text gives for the measured points, N, in the same order, if
-        they differ from those in its program; else empty.
-    """
-
-    kind: ClassVar[str] = 'press'
-    pressure: float
-    highest_force: float
-    text_forces: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class DragBench:
-    """Test in which something is pressed and dragged until it begins to slip.
-
-    Attributes
-    ----------
-    speed : float
-        Speed of the stage that drags the foot, m/s.
-    dwell : float
-        Time from touch-down until the stage starts, s.
-    film_thickness : float
-        Depth of the liquid on wet ground, m.
-    viscosity : float
-        Viscosity of the liquid, Pa s.
-    advancing_angle, receding_angle : float
-        Contact angles at which the edge of the liquid advances and recedes, rad.
-    """
-
-    speed: float
-    dwell: float
-    film_thickness: float
-    viscosity: float
-    advancing_angle: float
-    receding_angle: float
-
-
-@dataclass(frozen=True)
-class TangentialBench(DragBench):
-    """Test in which a pressed pad is dragged (thesis 3.2.2).
-
-    Attributes
-    ----------
-    highest_load : float
-        Normal force up to which the flat pad is tried, N.
-    smallest_radius, largest_radius : float
-        Pad radii between which the height of rise is drawn, m.
-    claimed_smallest, claimed_largest : float
-        Pad radii between which the thesis claims the optimum, m.
-    """
-
-    kind: ClassVar[str] = 'tangential'
-    highest_load: float
-    smallest_radius: float
-    largest_radius: float
-    claimed_smallest: float
-    claimed_largest: float
-
-
-@dataclass(frozen=True)
-class FootBench(DragBench):
-    """Test in which a whole foot is pressed and dragged on four floors (thesis 4.3.1).
-
-    Attributes
-    ----------
-    pressure : float
-        Gauge pressure of the domes, Pa.
-    lowest_load, highest_load : float
-        Normal forces between which the foot is tried, N.
-    roughness : float
-        Root mean square height of the rough floor, m; the smooth one has none.
-    factor : float
-        Factor by which each assumed number may be too high or too low.
-    samples, seed : int
-        Number of draws of the assumed numbers, and what fixes them.
-    claimed_lowest, claimed_highest : float
-        Relative errors between which the thesis' estimate is claimed to be.
-    """
-
-    kind: ClassVar[str] = 'foot'
-    pressure: float
-    lowest_load: float
-    highest_load: float
-    roughness: float
-    factor: float
-    samples: int
-    seed: int
-    claimed_lowest: float
-    claimed_highest: float
-
-
-Setup: TypeAlias = InflationBench | PressBench | TangentialBench | FootBench
+from ros_pad.simulation.scene import foot_of
 
 
 @dataclass(frozen=True)
@@ -151,28 +30,34 @@ class BenchScene:
     ----------
     source : str
         Name of the shipped scene, or path of the file, that describes it.
-    name, description : str
-        Name without folder, and the text ``description`` of the file.
+    name, kind, description : str
+        Name without folder; ``inflation``, ``press``, ``tangential`` or ``foot``; and the text
+        ``description`` of the file.
     foot : Foot
         Foot whose pad is tested. In the tangential bench it has this one pad, and its whole sole;
         in the bench of a foot all of its pads, and the force limit of the scene.
     measurements : Path
         CSV file with the measured points.
-    setup : InflationBench, PressBench, TangentialBench or FootBench
-        The test.
+    setup : namespace
+        The test: the numbers of the file by their keys, SI units.
     """
 
     source: str
     name: str
+    kind: str
     description: str
     foot: Foot
     measurements: pathlib.Path
-    setup: Setup
+    setup: Any
 
     @property
     def pad(self) -> Pad:
         """The pad on the bench."""
         return self.foot.pad
+
+    def changed(self, **numbers: Any) -> BenchScene:
+        """Return the scene with other numbers of its test."""
+        return replace(self, setup=SimpleNamespace(**vars(self.setup) | numbers))
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str], foot: Foot | None = None) -> BenchScene:
@@ -193,11 +78,7 @@ class BenchScene:
             range).
         """
         path = configuration.locate('scenes', name_or_path)
-        return cls.read(Table.load(path), os.fspath(name_or_path), path.stem, foot)
-
-    @classmethod
-    def read(cls, table: Table, source: str, name: str, foot: Foot | None = None) -> BenchScene:
-        """Read a bench scene from a table; raise ConfigError as :meth:`load` does."""
+        table = Table.load(path)
         if 'robot' in table and 'bench' not in table:
             raise ConfigError(
                 f'{table.origin}: is no bench, but a scene with a robot: Scene.load reads it'
@@ -216,29 +97,14 @@ class BenchScene:
                     f'{foot.capillary_force:g} N is not allowed: 0 is needed, for this bench puts '
                     'bounds of its own on that force'
                 )
-            foot = dataclasses.replace(foot, limit=table.choice('criterion', criteria(foot.pad)))
-        setup = _READERS[kind](table, foot)
+            foot = replace(foot, limit=table.choice('criterion', criteria(foot.pad)))
+        setup = SimpleNamespace(**_READERS[kind](table, foot))
         if kind == 'tangential':
             # The sole keeps its size: around the one dome, the other pads stay part of it.
-            share = foot.shear_stiffness / foot.pads
-            foot = dataclasses.replace(foot, pads=1, shear_stiffness=share)
+            foot = replace(foot, pads=1, shear_stiffness=foot.shear_stiffness / foot.pads)
         table.finish()
-        return cls(source, name, description, foot, measurements, setup)
-
-
-def load(name_or_path: str | os.PathLike[str]) -> Scene | BenchScene:
-    """Read a scene of either kind: a walk or a bench.
-
-    Raises
-    ------
-    ConfigError
-        As :meth:`BenchScene.load` and :meth:`ros_pad.simulation.scene.Scene.load`.
-    """
-    path = configuration.locate('scenes', name_or_path)
-    table = Table.load(path)
-    if 'bench' in table:
-        return BenchScene.read(table, os.fspath(name_or_path), path.stem)
-    return Scene.read(table, os.fspath(name_or_path), path.stem)
+        source = os.fspath(name_or_path)
+        return cls(source, path.stem, kind, description, foot, measurements, setup)
 
 
 def _measurements(table: Table) -> pathlib.Path:
@@ -256,74 +122,79 @@ def _measurements(table: Table) -> pathlib.Path:
     return path
 
 
-def _numbers(table: Table, **wanted: tuple[str, float, float]) -> dict[str, float]:
+Numbers = dict[str, Any]
+
+
+def _numbers(table: Table, **wanted: tuple[str, float, float]) -> Numbers:
     """Return numbers by key, each with unit, lowest and highest value."""
     return {name: table.number(name, *given) for name, given in wanted.items()}
 
 
-def _inflation(table: Table, foot: Foot) -> InflationBench:
+def _inflation(table: Table, foot: Foot) -> Numbers:
+    """Read the test in which a free pad is inflated (thesis 3.2.1)."""
     burst = 0.99 * BURST * foot.pad.stiffness / foot.pad.radius
-    return InflationBench(
-        **_numbers(
-            table, highest_pressure=('Pa', 1e3, burst), claimed_error=('(relative)', 0.0, 1.0)
-        )
+    return _numbers(
+        table, highest_pressure=('Pa', 1e3, burst), claimed_error=('(relative)', 0.0, 1.0)
     )
 
 
-def _press(table: Table, foot: Foot) -> PressBench:
+def _press(table: Table, foot: Foot) -> Numbers:
+    """Read the test in which an inflated pad is pressed on a plate (thesis 3.2.1)."""
     pad = foot.pad
     end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
     pressure = table.number('pressure', 'Pa', 1e3, end)
     force = ('N', 0.0, pressure * math.pi * pad.radius**2)  # pressed flat
-    text: dict[str, float] = {}
+    text: Numbers = {}
     if 'text_forces' in table:
         with table.table('text_forces') as part:
             text = _numbers(part, first=force, second=force, third=force)
-    return PressBench(pressure, table.number('highest_force', *force), tuple(text.values()))
+    found = {'pressure': pressure, 'text_forces': tuple(text.values())}
+    return found | _numbers(table, highest_force=force)
 
 
-def _dragged(table: Table, floor: Table) -> dict[str, float]:
-    """Return the numbers of :class:`DragBench`."""
-    advancing = floor.number('advancing_angle', 'rad', 0.0, math.pi)
+def _dragged(table: Table, floor: Table) -> Numbers:
+    """Read what is the same for a pad and a foot that are pressed, and dragged until they slip."""
+    angle = _numbers(floor, advancing_angle=('rad', 0.0, math.pi))
+    viscosity = floor.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY)
     return {
-        'advancing_angle': advancing,
-        'viscosity': floor.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
+        **angle,
+        'viscosity': viscosity,
         **_numbers(
-            floor, film_thickness=('m', 1e-9, 0.01), receding_angle=('rad', 0.0, advancing)
+            floor,
+            film_thickness=('m', 1e-9, 0.01),
+            receding_angle=('rad', 0.0, angle['advancing_angle']),
         ),
         **_numbers(table, speed=('m/s', 1e-6, 1.0), dwell=('s', 0.0, 3600.0)),
     }
 
 
-def _foot(table: Table, foot: Foot) -> FootBench:
+def _foot(table: Table, foot: Foot) -> Numbers:
+    """Read the test in which a whole foot is pressed and dragged on four floors (4.3.1)."""
     with table.table('floor') as part:
         numbers = _dragged(table, part) | _numbers(part, roughness=('m', 0.0, 1e-3))
     with table.table('doubt') as part:
-        factor = part.number('factor', '(factor)', 1.0, 10.0)
-        samples, seed = (part.integer('samples', 20, 100000), part.integer('seed', 0, 2**32 - 1))
-    pressure = table.number('pressure', 'Pa', 1e3, foot.ceiling)
-    carried = foot.pads * float(force_limit(foot.pad, pressure, foot.limit))
+        numbers |= _numbers(part, factor=('(factor)', 1.0, 10.0))
+        numbers['samples'] = part.integer('samples', 20, 100000)
+        numbers['seed'] = part.integer('seed', 0, 2**32 - 1)
+    numbers |= _numbers(table, pressure=('Pa', 1e3, foot.ceiling))
+    carried = foot.pads * float(force_limit(foot.pad, numbers['pressure'], foot.limit))
     if not carried:
         raise ConfigError(
-            f'{table.origin}: criterion = {foot.limit!r}: domes of {pressure:g} Pa carry nothing '
-            'by it: another criterion, or a higher pressure, is needed'
+            f'{table.origin}: criterion = {foot.limit!r}: domes of {numbers["pressure"]:g} Pa '
+            'carry nothing by it: another criterion, or a higher pressure, is needed'
         )
     # With the fewest domes that are drawn, too, domes carry all of the load.
-    highest = table.number('highest_load', 'N', 1e-3, carried / factor)
-    least = table.number('claimed_lowest', '(relative)', 0.0, 1.0)
-    return FootBench(
-        **numbers,
-        **_numbers(
-            table, lowest_load=('N', 1e-4, 0.5 * highest), claimed_highest=('(relative)', least, 1)
-        ),
-        **{'pressure': pressure, 'highest_load': highest, 'claimed_lowest': least},
-        factor=factor,
-        samples=samples,
-        seed=seed,
+    numbers |= _numbers(table, highest_load=('N', 1e-3, carried / numbers['factor']))
+    numbers |= _numbers(table, claimed_lowest=('(relative)', 0.0, 1.0))
+    return numbers | _numbers(
+        table,
+        lowest_load=('N', 1e-4, 0.5 * numbers['highest_load']),
+        claimed_highest=('(relative)', numbers['claimed_lowest'], 1),
     )
 
 
-def _tangential(table: Table, foot: Foot) -> TangentialBench:
+def _tangential(table: Table, foot: Foot) -> Numbers:
+    """Read the test in which a pressed pad is dragged (thesis 3.2.2)."""
     with table.table('floor') as part:
         numbers = _dragged(table, part)
     with table.table('design') as part:
@@ -332,10 +203,10 @@ def _tangential(table: Table, foot: Foot) -> TangentialBench:
         ends = numbers['smallest_radius'], numbers['largest_radius']
         numbers |= _numbers(part, claimed_smallest=('m', *ends))
         numbers |= _numbers(part, claimed_largest=('m', numbers['claimed_smallest'], ends[1]))
-    return TangentialBench(**numbers, **_numbers(table, highest_load=('N', 1e-3, 100.0)))
+    return numbers | _numbers(table, highest_load=('N', 1e-3, 100.0))
 
 
-_READERS: dict[str, Callable[[Table, Foot], Setup]] = {
+_READERS: dict[str, Callable[[Table, Foot], Numbers]] = {
     'inflation': _inflation,
     'press': _press,
     'tangential': _tangential,

@@ -7,11 +7,13 @@ What the thesis says, and every word that no number changes, is in words.yaml be
 from __future__ import annotations
 
 import pathlib
+import string
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
 import yaml
 from matplotlib.figure import Figure
 
@@ -98,12 +100,41 @@ class Claim:
         return asdict(self) | {'where': self.where, 'verdict': self.verdict}
 
 
-def claim(
-    key: str, ours: str, numbers: tuple[float, ...], holds: bool | None, **more: Any
-) -> Claim:
-    """Return the statement of words.yaml with a key; ``more`` replaces or adds attributes."""
-    words = _WORDS['statements'][key]
-    return Claim(**{'ours': ours, 'numbers': numbers, 'holds': holds, **words, **more})
+class _Words(string.Formatter):
+    """Formats a share with ``%`` behind its form, and sequences with commas and "and"."""
+
+    def format_field(self, value: Any, form: str) -> Any:
+        """Return a value as text."""
+        if isinstance(value, (list, tuple, np.ndarray)):
+            return join([self.format_field(each, form) for each in value])
+        if form.endswith('%'):
+            value, form, end = 100.0 * value, form[:-1], ' %'
+        else:
+            end = ''
+        text = format(value, form) + end
+        return text.replace('-', '−', 1) if text.startswith('-') else text
+
+
+def join(words: list[str]) -> str:
+    """Return words with commas, and "and" before the last one."""
+    return ' and '.join([', '.join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def worded(text: Any, /, *ordered: Any, **values: Any) -> Any:
+    """Return a text of words.yaml with values in place of their names."""
+    return _Words().format(text, *ordered, **values) if isinstance(text, str) else text
+
+
+def claim(key: str, numbers: Any, holds: Any, /, **values: Any) -> Claim:
+    """Return a statement of words.yaml by its key, with the numbers that decide, and if it holds.
+
+    ``values`` are what the texts name in braces; ``figure`` and ``section`` where words.yaml has
+    none.
+    """
+    words = {name: worded(text, **values) for name, text in _WORDS['statements'][key].items()}
+    words |= {name: values[name] for name in ('figure', 'section') if name in values}
+    deciding = tuple(np.ravel(numbers).tolist())
+    return Claim(**words, numbers=deciding, holds=None if holds is None else bool(holds))
 
 
 def counted(claims: Sequence[Claim]) -> str:
@@ -134,18 +165,21 @@ class Explained:
     parts: dict[str, str]
 
 
-def drawn(number: int, figure: Figure, **more: str) -> Drawn:
-    """Return a drawn figure with its title, text and caption; ``more`` replaces or adds them."""
-    words = _WORDS['figures'][number] | more
-    return Drawn(figure, words['title'], words['alt'], words['caption'])
+def drawn(number: int, figure: Figure, **values: Any) -> Drawn:
+    """Return a drawn figure with its title, text and caption, in which ``values`` are named."""
+    words = [worded(_WORDS['figures'][number][name], **values) for name in _SHOWN]
+    return Drawn(figure, *words)
+
+
+_SHOWN = ('title', 'alt', 'caption')
 
 
 def explained(
-    number: int, figure: Figure | Drawn, claims: Sequence[Claim], **more: str
+    number: int, figure: Figure | Drawn, claims: Sequence[Claim], **values: Any
 ) -> Explained:
-    """Return a figure of the thesis with the texts of words.yaml; ``more`` replaces them."""
-    words = _WORDS['figures'][number] | more
-    shown = figure if isinstance(figure, Drawn) else drawn(number, figure, **more)
+    """Return a figure with the texts of words.yaml, in which ``values`` are named."""
+    shown = figure if isinstance(figure, Drawn) else drawn(number, figure, **values)
+    words = _WORDS['figures'][number]
     parts = {name: words[name] for name in ('measured', 'modelled', 'assumed')}
     return Explained(number, shown, tuple(claims), parts)
 
@@ -157,6 +191,11 @@ class Omission(NamedTuple):
     bound: float | None
     reason: str
 
+    def words(self) -> tuple[str, str, str]:
+        """Return it as text."""
+        bound = 'unknown' if self.bound is None else f'≤ {100.0 * self.bound:.2g} %'
+        return self.term, bound, self.reason
+
 
 def left_out(bench: str, **bounds: float) -> tuple[Omission, ...]:
     """Return what a bench leaves out, with the bounds by key; without one it is unknown."""
@@ -166,4 +205,4 @@ def left_out(bench: str, **bounds: float) -> tuple[Omission, ...]:
 
 def notes(bench: str, **numbers: object) -> tuple[str, ...]:
     """Return the notes of a bench, with numbers by name."""
-    return tuple(note.format(**numbers) for note in _WORDS['benches'][bench]['notes'])
+    return tuple(worded(note, **numbers) for note in _WORDS['benches'][bench]['notes'])

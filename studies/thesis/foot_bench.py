@@ -7,24 +7,25 @@ verdict stands only where it does not depend on them.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_pad.capillary import Mesh, wet
 from ros_pad.contact.dome import press
 from ros_pad.contact.limits import force_limit
-from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid, hysteresis_force, meniscus
+from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid, meniscus
 from ros_pad.contact.pad import Array
 from ros_pad.contact.resistance import Foot
-from studies.thesis.bench import NOT_CODED, BenchTrial, Curve, Row
-from studies.thesis.bench_scene import BenchScene, FootBench
-from studies.thesis.explained import MINIMAL, Claim, Omission, claim, left_out, notes
-from studies.thesis.tangential import CAPILLARY, DRY, WET, slip_force
+from studies.thesis.bench import BenchTrial, Curve, Row
+from studies.thesis.bench_scene import BenchScene
+from studies.thesis.explained import MINIMAL, Claim, claim, left_out, notes
+from studies.thesis.tangential import CAPILLARY, DRY, WET, pinned, slip_force
 
 FLAT, DOME = 'flat', 'dome'
 SMOOTH, ROUGH = 'smooth', 'rough'
@@ -71,12 +72,12 @@ def straight(x: Array, y: Array) -> Line:
     return Line(float(slope), round(float(intercept), 9) + 0.0, round(float(deviation), 9))
 
 
-def on_floors(foot: Foot, setup: FootBench) -> dict[str, Foot]:
+def on_floors(foot: Foot, setup: Any) -> dict[str, Foot]:
     """Return the foot as it is on each floor."""
     return {SMOOTH: foot, ROUGH: foot.on_rough(setup.roughness)}
 
 
-def pull(foot: Foot, setup: FootBench, load: float, shape: str) -> Pulled:
+def pull(foot: Foot, setup: Any, load: float, shape: str) -> Pulled:
     """Return the forces of a foot, as it is on its floor, under a load, N, flat or domed.
 
     Pinned lines run around every dome, or around the flat sole. Suction is that of a small ring of
@@ -84,20 +85,16 @@ def pull(foot: Foot, setup: FootBench, load: float, shape: str) -> Pulled:
     4 π R γ, whatever its volume, times the friction that a further load meets.
     """
     pressure = setup.pressure if shape == DOME else 0.0
-    dry, wet = (
-        slip_force(foot, load, pressure, depth, setup.viscosity, setup.speed, setup.dwell)
-        for depth in (0.0, setup.film_thickness)
-    )
-    angles = (WATER.surface_tension, setup.advancing_angle, setup.receding_angle)
+    dry, wet = (slip_force(foot, setup, load, pressure, wet) for wet in (False, True))
     if not pressure:
-        return Pulled(dry, wet, float(hysteresis_force(foot.sole_radius, *angles)), 0.0)
+        return Pulled(dry, wet, float(pinned(foot.sole_radius, setup)), 0.0)
     pressed = press(foot.pad, pressure, load / foot.pads)
-    lines = foot.pads * float(hysteresis_force(pressed.contact_radius, *angles))
+    lines = foot.pads * float(pinned(pressed.contact_radius, setup))
     bridges = foot.pads * 4.0 * math.pi * pressed.sphere_radius * WATER.surface_tension
     return Pulled(dry, wet, lines, bridges * dry / load)
 
 
-def draws(foot: Foot, setup: FootBench) -> list[tuple[Foot, FootBench, float]]:
+def draws(foot: Foot, setup: Any) -> list[tuple[Foot, Any, float]]:
     """Return feet and benches with every assumed number drawn anew, and a factor on pinned lines.
 
     Each number has a factor of its own, log-uniform between one over the bench's and that. Pads
@@ -105,25 +102,24 @@ def draws(foot: Foot, setup: FootBench) -> list[tuple[Foot, FootBench, float]]:
     """
     generator = np.random.default_rng(setup.seed)
     names = (*_ON_FOOT, *_ON_BENCH, 'pads', 'lines')
+    most = int((foot.sole_radius / foot.pad.radius) ** 2)
     drawn = []
     for _ in range(setup.samples):
         random = setup.factor ** generator.uniform(-1.0, 1.0, len(names))
         factors = dict(zip(names, random.tolist(), strict=True))
         own = {name: factors[name] * getattr(foot, name) for name in _ON_FOOT}
-        most = int((foot.sole_radius / foot.pad.radius) ** 2)
         own['pads'] = min(math.ceil(factors['pads'] * foot.pads), most)
         bench = {name: factors[name] * getattr(setup, name) for name in _ON_BENCH}
-        drawn.append(
-            (
-                dataclasses.replace(foot, **own),
-                dataclasses.replace(setup, **bench),
-                factors['lines'],
-            )
-        )
+        changed = SimpleNamespace(**vars(setup) | bench)
+        drawn.append((replace(foot, **own), changed, factors['lines']))
     return drawn
 
 
-def compute(scene: BenchScene, setup: FootBench) -> BenchTrial:
+Found = Mapping[tuple[str, str], Sequence[Pulled]]
+"""Forces over the load by morphology and floor."""
+
+
+def compute(scene: BenchScene) -> BenchTrial:
     """Compute the bench of a foot.
 
     Raises
@@ -131,7 +127,7 @@ def compute(scene: BenchScene, setup: FootBench) -> BenchTrial:
     NoEquilibrium
         Where a dome of the scene does not exist.
     """
-    foot = scene.foot
+    foot, setup = scene.foot, scene.setup
     loads = np.linspace(setup.lowest_load, setup.highest_load, _POINTS)
     feet = on_floors(foot, setup)
     found = {
@@ -143,19 +139,23 @@ def compute(scene: BenchScene, setup: FootBench) -> BenchTrial:
     rows = _force_rows(setup, curves, lines)
     rows += _difference_rows(setup, found, _drawn(foot, setup))
     rows += _capillary_rows(foot, setup, curves)
-    return BenchTrial(
-        scene,
-        tuple(rows),
-        _claims(scene, setup, rows, found, lines),
-        curves,
-        _notes(scene, setup),
-        _omitted(foot, setup, found),
-    )
+    limit = foot.pads * float(force_limit(foot.pad, setup.pressure, foot.limit))
+    stated = notes(
+        'foot', pressure=1e-3 * setup.pressure, pads=foot.pads, limit=limit, criterion=foot.limit,
+        full=foot.sole_area * foot.conforming_pressure, samples=setup.samples,
+        factor=setup.factor, seed=setup.seed,
+    )  # fmt: skip
+    # Couette shear of the sole on a film as thin as the roughness of the pad
+    shear = setup.viscosity * setup.speed * foot.sole_area / foot.critical_film
+    share = shear / min(each.wet for pulled in found.values() for each in pulled)
+    gap = press(foot.pad, setup.pressure, setup.lowest_load / foot.pads).gap
+    weight = WATER.density * GRAVITY * foot.sole_area * float(gap)
+    omitted = left_out('foot', shear=share, weight=weight / setup.lowest_load)
+    claims = _claims(scene, rows, found, lines, shear, share)
+    return BenchTrial(scene, rows, claims, curves, stated, omitted)
 
 
-def _curves(
-    foot: Foot, setup: FootBench, loads: Array, found: Mapping[tuple[str, str], Sequence[Pulled]]
-) -> dict[str, Curve]:
+def _curves(foot: Foot, setup: Any, loads: Array, found: Found) -> dict[str, Curve]:
     """Return tangential forces, wet less dry, and the thesis' estimates over the load."""
     curves = {}
     for (shape, floor), pulled in found.items():
@@ -179,12 +179,13 @@ def _kinds(shape: str) -> tuple[str, ...]:
     return (NONE, LINES, SUCTION) if shape == DOME else (NONE, LINES)
 
 
-def _drawn(foot: Foot, setup: FootBench) -> dict[tuple[str, str, float, str], Array]:
+def _drawn(foot: Foot, setup: Any) -> dict[tuple[str, str, float, str], Array]:
     """Return wet less dry, N, for all draws, by morphology, floor, load and kind."""
     values: dict[tuple[str, str, float, str], list[float]] = {}
     for own, bench, factor in draws(foot, setup):
         feet = on_floors(own, bench)
-        for (shape, floor), load in itertools.product(CASES, _ends(setup)):
+        ends = setup.lowest_load, setup.highest_load
+        for (shape, floor), load in itertools.product(CASES, ends):
             pulled = pull(feet[floor], bench, load, shape)
             pulled = pulled._replace(lines=factor * pulled.lines)
             for kind in _kinds(shape):
@@ -192,92 +193,65 @@ def _drawn(foot: Foot, setup: FootBench) -> dict[tuple[str, str, float, str], Ar
     return {key: np.array(each) for key, each in values.items()}
 
 
-def _ends(setup: FootBench) -> tuple[float, float]:
-    return setup.lowest_load, setup.highest_load
-
-
-def _force_rows(
-    setup: FootBench, curves: Mapping[str, Curve], lines: Mapping[str, Line]
-) -> list[Row]:
+def _force_rows(setup: Any, curves: Mapping[str, Curve], lines: Mapping[str, Line]) -> list[Row]:
     rows = []
     for name, line in lines.items():
         pressure = setup.pressure if name.startswith(DOME) else 0.0
-        for place in (0, -1):
-            load, force = (float(each[place]) for each in curves[name])
-            rows.append(
-                Row(34, 'tangential force', 'N', 'foot', name, pressure, load, force, None,
-                    NOT_CODED)
-            )  # fmt: skip
+        rows += [
+            Row(34, 'tangential force', 'N', 'foot', name, pressure, load, force)
+            for load, force in np.transpose(curves[name])[[0, -1]].tolist()
+        ]
         rows += [
             Row(34, quantity, unit, 'foot', name, pressure, None, value, None, 'linear')
-            for quantity, unit, value in (
-                ('slope', '', line.slope),
-                ('intercept', 'N', line.intercept),
-                ('deviation from the line', '', line.deviation),
-            )
+            for (quantity, unit), value in zip(_LINE.items(), line, strict=True)
         ]
     return rows
 
 
+_LINE = {'slope': '', 'intercept': 'N', 'deviation from the line': ''}
+
+
 def _difference_rows(
-    setup: FootBench,
-    found: Mapping[tuple[str, str], Sequence[Pulled]],
-    drawn: Mapping[tuple[str, str, float, str], Array],
+    setup: Any, found: Found, drawn: Mapping[tuple[str, str, float, str], Array]
 ) -> list[Row]:
     rows = []
     for (shape, floor, load, kind), values in drawn.items():
         pulled = found[shape, floor][0 if load == setup.lowest_load else -1]
-        condition = f'{shape}, {floor}, {kind}'
-        pressure = setup.pressure if shape == DOME else 0.0
-        for model, value in (
-            ('foot', pulled.less_dry(kind)),
-            ('5 % of draws', float(np.quantile(values, LOW))),
-            ('95 % of draws', float(np.quantile(values, HIGH))),
-        ):
-            rows.append(
-                Row(34, 'wet less dry', 'N', model, condition, pressure, load, value, None,
-                    NOT_CODED)
-            )  # fmt: skip
+        at = f'{shape}, {floor}, {kind}', setup.pressure if shape == DOME else 0.0, load
+        low, high = np.quantile(values, (LOW, HIGH)).tolist()
+        less = {'foot': pulled.less_dry(kind), '5 % of draws': low, '95 % of draws': high}
+        rows += [Row(34, 'wet less dry', 'N', name, *at, value) for name, value in less.items()]
         share = float(np.mean(values > 0.0))
-        rows.append(
-            Row(34, 'share of draws above 0', '', 'foot', condition, pressure, load, share, None,
-                NOT_CODED)
-        )  # fmt: skip
+        rows.append(Row(34, 'share of draws above 0', '', 'foot', *at, share))
     return rows
-
-
-def _capillary_rows(foot: Foot, setup: FootBench, curves: Mapping[str, Curve]) -> list[Row]:
-    """Return the estimates of the thesis for all domes, as magnitudes."""
-    found = [
-        (name, float(curve.x[place]), float(curve.y[place]))
-        for name, curve in curves.items()
-        if name == PATTERN or name.startswith('3.82')
-        for place in (0, -1)
-    ]
-    load = setup.lowest_load
-    for (liquid_name, liquid), balance in itertools.product(
-        _LIQUIDS.items(), ('energy', 'thesis')
-    ):
-        force = _by_layers(foot, setup.pressure, load, liquid, balance)
-        if math.isfinite(force):  # not where the liquid reaches the base of the pads
-            found.append((f'4.18, {balance}, {liquid_name}', load, force))
-    claimed = f'within {100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %'
-    return [
-        Row(34, 'capillary force of the thesis', 'N', name, WET, setup.pressure, load, force, None,
-            claimed)
-        for name, load, force in found
-    ]  # fmt: skip
 
 
 _LIQUIDS = {'water': WATER, '4 mN/m': Liquid(0.004, 0.002)}  # the second is that of 4.2.1
 
 
-def _by_layers(foot: Foot, pressure: float, load: float, liquid: Liquid, balance: str) -> float:
-    """Return 4.18 for all domes, each alone, N; NaN where the liquid reaches their base."""
-    pressed = press(foot.pad, pressure, load / foot.pads)
+def _capillary_rows(foot: Foot, setup: Any, curves: Mapping[str, Curve]) -> list[Row]:
+    """Return the estimates of the thesis for all domes, as magnitudes."""
+    found = [
+        (name, *end)
+        for name, curve in curves.items()
+        if name == PATTERN or name.startswith('3.82')
+        for end in np.transpose(curve)[[0, -1]].tolist()
+    ]
+    load = setup.lowest_load
+    pressed = press(foot.pad, setup.pressure, load / foot.pads)
     sphere, contact = float(pressed.sphere_radius), float(pressed.contact_radius)
     mesh = Mesh.dome(sphere, contact, float(pressed.gap), rings=48, sectors=48)
-    return foot.pads * abs(wet(mesh, liquid, balance, slices=4, strict=False).force(0.0))
+    for (name, liquid), balance in itertools.product(_LIQUIDS.items(), ('energy', 'thesis')):
+        # 4.18 for all domes, each alone
+        force = wet(mesh, liquid, balance, slices=4, strict=False).force(0.0)
+        if math.isfinite(force):  # not where the liquid reaches the base of the pads
+            found.append((f'4.18, {balance}, {name}', load, foot.pads * abs(force)))
+    claimed = f'within {100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %'
+    quantity = 'capillary force of the thesis'
+    return [
+        Row(34, quantity, 'N', name, WET, setup.pressure, load, force, None, claimed)
+        for name, load, force in found
+    ]
 
 
 # --- claims --------------------------------------------------------------------------------------
@@ -285,30 +259,36 @@ def _by_layers(foot: Foot, pressure: float, load: float, liquid: Liquid, balance
 
 def _claims(
     scene: BenchScene,
-    setup: FootBench,
     rows: Sequence[Row],
-    found: Mapping[tuple[str, str], Sequence[Pulled]],
+    found: Found,
     lines: Mapping[str, Line],
+    shear: float,
+    share: float,
 ) -> tuple[Claim, ...]:
+    foot, setup = scene.foot, scene.setup
+    worst = max(lines, key=lambda name: lines[name].deviation)
+    good = sum(line.deviation <= STRAIGHT for line in lines.values())
+    limits = {
+        name: foot.pads * float(force_limit(foot.pad, setup.pressure, name))
+        for name in ('measured', 'thickness', 'flattening')
+    }
     return (
-        claim(
-            'microscope pictures of a',
-            f'The rough one is taken as {1e6 * setup.roughness:g} µm RMS, drawn up to twice and '
-            'half.',
-            (setup.roughness,),
-            None,
-        ),
+        claim('microscope pictures of a', setup.roughness, None, roughness=1e6 * setup.roughness),
         *(_sign_claim(setup, rows, *case) for case in CASES),
-        _linear_claim(setup, lines),
+        claim('friction is linear in', [line.deviation for line in lines.values()],
+              True if good == len(lines) else None, load=setup.highest_load, good=good,
+              count=len(lines), worst=lines[worst].deviation, name=worst),
         _small_claim(found),
-        _error_claim(setup, rows, found),
-        _viscosity_claim(scene.foot, setup, found),
-        _pressure_claim(scene.foot, setup),
+        _error_claim(setup, rows, found[DOME, SMOOTH][-1]),
+        claim('the stage is slow', share, share <= STRAIGHT, shear=1e3 * shear, share=share,
+              speed=1e3 * setup.speed),
+        claim('a foot stands on', [*limits.values()], None, pads=foot.pads, **limits,
+              pressure=1e-3 * setup.pressure),
         _title_claim(found),
-    )
+    )  # fmt: skip
 
 
-def _sign_claim(setup: FootBench, rows: Sequence[Row], shape: str, floor: str) -> Claim:
+def _sign_claim(setup: Any, rows: Sequence[Row], shape: str, floor: str) -> Claim:
     """Return the verdict on the sign: decided where an interval is on one side of 0."""
     parts, lows, highs = [], [], []
     for kind in _kinds(shape):
@@ -317,159 +297,60 @@ def _sign_claim(setup: FootBench, rows: Sequence[Row], shape: str, floor: str) -
             [1e3 * row.modelled for row in mine if row.model == model and row.unit == 'N']
             for model in ('foot', '5 % of draws', '95 % of draws')
         )
-        share = [f'{100 * row.modelled:.0f}' for row in mine if not row.unit]
-        parts.append(
-            f'{kind} {_few(here[0])} and {_few(here[1])} mN, above 0 in {share[0]} and '
-            f'{share[1]} % of draws'
-        )
+        shares = [f'{100 * row.modelled:.0f}' for row in mine if not row.unit]
+        parts.append(f'{kind} {_few(here)} mN, above 0 in {" and ".join(shares)} % of draws')
         if kind != NONE:
             lows += low
             highs += high
-    decided = True if min(lows) > 0.0 else False if max(highs) < 0.0 else None
-    loads = f'At {setup.lowest_load:g} and {setup.highest_load:g} N: '
+    holds = True if min(lows) > 0.0 else False if max(highs) < 0.0 else None
     return claim(
-        'f cap f wet',
-        loads + '; '.join(parts).replace('-', '−') + f'; {setup.samples} draws.',
-        (*lows, *highs),
-        decided,
-        thesis=f'F_cap = F_wet − F_dry is what the liquid adds ({shape}, {floor}).',
-    )
+        'f cap f wet', (*lows, *highs), holds, shape=shape, floor=floor,
+        loads=(setup.lowest_load, setup.highest_load), parts='; '.join(parts),
+        samples=setup.samples,
+    )  # fmt: skip
 
 
-def _few(value: float) -> str:
-    """Return a force, mN, with about two digits."""
-    return f'{value:.{0 if abs(value) >= 100.0 else 1 if abs(value) >= 1.0 else 2}f}'
+def _few(values: Iterable[float]) -> str:
+    """Return forces, mN, with about two digits."""
+    return ' and '.join(
+        f'{value:.{0 if abs(value) >= 100.0 else 1 if abs(value) >= 1.0 else 2}f}'
+        for value in values
+    ).replace('-', '−')
 
 
-def _linear_claim(setup: FootBench, lines: Mapping[str, Line]) -> Claim:
-    worst = max(lines, key=lambda name: lines[name].deviation)
-    good = sum(line.deviation <= STRAIGHT for line in lines.values())
-    return claim(
-        'friction is linear in',
-        f'Up to {setup.highest_load:g} N {good} of {len(lines)} lines are straight; the worst is '
-        f'off by {100 * lines[worst].deviation:.2g} % of its largest force ({worst}).',
-        tuple(line.deviation for line in lines.values()),
-        True if good == len(lines) else None,
-    )
-
-
-def _small_claim(found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
+def _small_claim(found: Found) -> Claim:
     share = max(each.lines / each.wet for each in (*found[DOME, SMOOTH], *found[DOME, ROUGH]))
     first, last = found[DOME, SMOOTH][0], found[DOME, SMOOTH][-1]
+    lines, dry = last.lines / first.lines, last.dry / first.dry
     return claim(
-        'the capillary force is',
-        f'Pinned lines hold at most {100 * share:.2g} % of the force of domes, and '
-        f'{last.lines / first.lines:.2f} times as much at the highest as at the lowest load, '
-        f'where dry friction is {last.dry / first.dry:.1f} times as much. Suction on moist ground '
-        f'may be {100 * first.suction / first.dry:.0f} % of it at the lowest load.',
-        (share,),
-        share <= MINIMAL and last.lines / first.lines < last.dry / first.dry * (1.0 - MINIMAL),
-    )
+        'the capillary force is', share, share <= MINIMAL and lines < dry * (1.0 - MINIMAL),
+        share=share, lines=lines, dry=dry, suction=first.suction / first.dry,
+    )  # fmt: skip
 
 
-def _error_claim(
-    setup: FootBench, rows: Sequence[Row], found: Mapping[tuple[str, str], Sequence[Pulled]]
-) -> Claim:
+def _error_claim(setup: Any, rows: Sequence[Row], last: Pulled) -> Claim:
     mine = [row for row in rows if row.quantity == 'capillary force of the thesis']
     estimates = [1e3 * row.modelled for row in mine]
-    last = found[DOME, SMOOTH][-1]
-    middle = 0.5 * (setup.claimed_lowest + setup.claimed_highest)
-    needed = [middle * force / math.sqrt(2.0) for force in (last.lines, last.suction)]
-    return claim(
-        'measured and estimated capillary 2',
-        f'By {len({row.model for row in mine})} readings and liquids, estimates for the foot are '
-        f'{_few(min(estimates))} to {_few(max(estimates))} mN.',
-        tuple(estimates),
-        None,
-        printed=f'{100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %',
-        rule=f'To know F_cap to {100 * middle:.0f} %, each force at {setup.highest_load:g} N must '
-        f'be known to {100 * needed[0] / last.dry:.2g} % (if it is that of pinned lines) or '
-        f'{100 * needed[1] / last.dry:.2g} % (if that of suction).',
+    ends = setup.claimed_lowest, setup.claimed_highest
+    middle = 0.5 * sum(ends)
+    lines, suction = (
+        middle * force / math.sqrt(2.0) / last.dry for force in (last.lines, last.suction)
     )
-
-
-def _shear(foot: Foot, setup: FootBench) -> float:
-    """Return Couette shear, N, of the sole on a film as thin as the roughness of the pad."""
-    return setup.viscosity * setup.speed * foot.sole_area / foot.critical_film
-
-
-def _viscosity_claim(
-    foot: Foot, setup: FootBench, found: Mapping[tuple[str, str], Sequence[Pulled]]
-) -> Claim:
-    shear = _shear(foot, setup)
-    share = shear / min(each.wet for pulled in found.values() for each in pulled)
     return claim(
-        'the stage is slow',
-        f'Shear of the film is at most {1e3 * shear:.1g} mN, {100 * share:.1g} % of the smallest '
-        'force. But films drain during so slow a pull, which moves F_wet more than any capillary '
-        'force.',
-        (share,),
-        share <= STRAIGHT,
-        printed=f'{1e3 * setup.speed:g} mm/s',
-    )
+        'measured and estimated capillary 2', estimates, None,
+        count=len({row.model for row in mine}), least=_few([min(estimates)]),
+        most=_few([max(estimates)]), lowest=100 * ends[0], highest=100 * ends[1], middle=middle,
+        load=setup.highest_load, lines=lines, suction=suction,
+    )  # fmt: skip
 
 
-def _pressure_claim(foot: Foot, setup: FootBench) -> Claim:
-    each = {
-        name: foot.pads * float(force_limit(foot.pad, setup.pressure, name))
-        for name in ('measured', 'thickness', 'flattening')
-    }
-    return claim(
-        'a foot stands on',
-        f'{foot.pads} such domes carry '
-        + ', '.join(f'{value:.2f} N by `{name}`' for name, value in each.items())
-        + '. The line through the limits of 3.2.2 is 0 below 52 kPa.',
-        tuple(each.values()),
-        None,
-        thesis=f'A foot stands on domes of {1e-3 * setup.pressure:g} kPa.',
-    )
-
-
-def _title_claim(found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
+def _title_claim(found: Found) -> Claim:
     shares, gains = [], []
     for floor, place in itertools.product((SMOOTH, ROUGH), (0, -1)):
         dome, flat = found[DOME, floor][place], found[FLAT, floor][place]
         gains.append(dome.wet / flat.wet)
         shares.append((dome.lines + dome.suction) / (dome.wet - flat.wet))
     return claim(
-        'title shape enhances wet',
-        f'On flooded ground domes hold {min(gains):.1f} to {max(gains):.1f} times what the flat '
-        'foot holds, for their pressure drains the film. Pinned lines and suction, upper bounds, '
-        f'are {100 * min(shares):.2g} to {100 * max(shares):.2g} % of that gain: here shape '
-        'enhances wet friction.',
-        tuple(shares),
-        None,
-    )
-
-
-# --- notes ---------------------------------------------------------------------------------------
-
-
-def _notes(scene: BenchScene, setup: FootBench) -> tuple[str, ...]:
-    foot = scene.foot
-    limit = foot.pads * float(force_limit(foot.pad, setup.pressure, foot.limit))
-    full = foot.sole_area * foot.conforming_pressure
-    return notes(
-        'foot',
-        pressure=1e-3 * setup.pressure,
-        pads=foot.pads,
-        limit=limit,
-        criterion=foot.limit,
-        full=full,
-        samples=setup.samples,
-        factor=setup.factor,
-        seed=setup.seed,
-    )
-
-
-def _omitted(
-    foot: Foot, setup: FootBench, found: Mapping[tuple[str, str], Sequence[Pulled]]
-) -> tuple[Omission, ...]:
-    shear = _shear(foot, setup)
-    gap = press(foot.pad, setup.pressure, setup.lowest_load / foot.pads).gap
-    weight = WATER.density * GRAVITY * foot.sole_area * float(gap)
-    return left_out(
-        'foot',
-        shear=shear / min(each.wet for pulled in found.values() for each in pulled),
-        weight=weight / setup.lowest_load,
-    )
+        'title shape enhances wet', shares, None, least=min(gains), most=max(gains),
+        low=100 * min(shares), high=100 * max(shares),
+    )  # fmt: skip

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
@@ -43,7 +42,7 @@ from ros_pad.reports.style import (
     legend,
 )
 from ros_pad.reports.wetted import DRY, WETTED, picture, shaded
-from studies.thesis.explained import Claim, Explained, claim, explained
+from studies.thesis.explained import Explained, claim, explained
 
 NUMBERS = (26, 27, 28, 29, 30, 31)
 TENSIONS = (0.0016, 0.002, 0.004)  # N/m of the liquid, thesis
@@ -70,16 +69,9 @@ class Found(NamedTuple):
 
 def draw(numbers: Collection[int] = NUMBERS) -> list[Explained]:
     """Draw some of the figures 26 to 31; the first call takes about 15 s for all."""
-    makers: dict[int, Callable[[], Explained]] = {
-        26: _figure_26,
-        27: _figure_27,
-        28: _figure_28,
-        29: _figure_29,
-        30: _figure_30,
-        31: _figure_31,
-    }
+    makers = (_figure_26, _figure_27, _figure_28, _figure_29, _figure_30, _figure_31)
     with matplotlib.rc_context(PAPER_STYLE):
-        return [make() for number, make in makers.items() if number in numbers]
+        return [make() for number, make in zip(NUMBERS, makers, strict=True) if number in numbers]
 
 
 # --- what is computed ----------------------------------------------------------------------------
@@ -146,24 +138,21 @@ def lobed_surface() -> WetSurface:
 @functools.cache
 def bodies() -> dict[str, Found]:
     """Return the three pads of figure 26 with their liquid, by name."""
-    round_ = Mesh.dome(*dome(), 1.3 * dome()[0], rings=24, sectors=48)
-    found = {}
-    walls = {
-        'dome': (round_, Wall.dome(*dome())),
-        'truncated cone': (
-            Mesh.cone(*_CONE, rings=24, sectors=48),
-            Wall.cone(_CONE[0], math.radians(100.0), _CONE[2]),
-        ),
-    }
-    for name, (mesh, wall) in walls.items():
-        height = bath_meniscus(wall=wall, liquid=_HALF).height
-        found[name] = Found(mesh, _by_balance(mesh), height, 0.0)
-    surface = lobed_surface()
-    line = surface.line[:, 2]
-    found['general shape'] = Found(
-        lobed(), _by_balance(lobed()), float(line.mean()), float(np.ptp(line))
+    cone = (
+        Mesh.cone(*_CONE, rings=24, sectors=48),
+        Wall.cone(_CONE[0], math.radians(100), _CONE[2]),
     )
-    return found
+    walls = {
+        'dome': (Mesh.dome(*dome(), 1.3 * dome()[0], rings=24, sectors=48), Wall.dome(*dome())),
+        'truncated cone': cone,
+    }
+    found = {
+        name: Found(mesh, _by_balance(mesh), bath_meniscus(wall=wall, liquid=_HALF).height, 0.0)
+        for name, (mesh, wall) in walls.items()
+    }
+    line = lobed_surface().line[:, 2]
+    general = Found(lobed(), _by_balance(lobed()), float(line.mean()), float(np.ptp(line)))
+    return found | {'general shape': general}
 
 
 def _by_balance(mesh: Mesh) -> dict[str, Wet]:
@@ -211,59 +200,38 @@ def _figure_26() -> Explained:
     figure = Figure(figsize=(WIDE, 2.15))
     found = bodies()
     for k, (name, each) in enumerate(found.items()):
-        ax: Any = figure.add_axes(
-            (k / 3.0, 0.0, 1.0 / 3.0, 1.0), projection='3d', computed_zorder=False
-        )
+        box = (k / 3.0, 0.0, 1.0 / 3.0, 1.0)
+        ax: Any = figure.add_axes(box, projection='3d', computed_zorder=False)
         _solid(ax, each.mesh, each.layers['energy'], 1.27)
-        heights = ', '.join(
-            f'{text} {1e3 * value:.2f}'
-            for text, value in (
-                ('energy', each.layers['energy'].mean_height),
-                ('thesis', each.layers['thesis'].mean_height),
-                ('exact', each.height),
-            )
-        )
+        energy, thesis = (1e3 * each.layers[name].mean_height for name in ('energy', 'thesis'))
+        text = f'energy {energy:.2f}, thesis {thesis:.2f}, exact {1e3 * each.height:.2f} mm'
         figure.text(k / 3.0 + 0.015, 0.93, f'({"abc"[k]}) {name}')
-        figure.text(k / 3.0 + 0.015, 0.04, f'{heights} mm', fontsize=7.0)
-    return explained(26, figure, _claims_26())
-
-
-def _claims_26() -> tuple[Claim, ...]:
-    found = bodies()
+        figure.text(k / 3.0 + 0.015, 0.04, text, fontsize=7.0)
     off = {
         balance: [each.layers[balance].mean_height / each.height - 1.0 for each in found.values()]
         for balance in _BALANCES
     }
     general = found['general shape']
-    spreads = [1e6 * general.layers['energy'].height_spread, 1e6 * general.spread]
-    return (
-        claim(
-            'simulated liquid agrees with',
-            f'Heights of its balance are off by {_percents(off["thesis"])} on dome, cone and '
-            f'general shape; those of the balance of energy by {_percents(off["energy"])}.',
-            (*off['thesis'], *off['energy']),
-            all(abs(each) <= _ALIGNED for each in off['thesis']),
-        ),
-        claim(
-            'round a general shape',
-            f'From slice to slice by {spreads[0]:.0f} µm; that of the exact surface by '
-            f'{spreads[1]:.0f} µm.',
-            tuple(spreads),
-            spreads[1] > 0.02e6 * general.height,
-        ),
-    )
+    layers, exact = 1e6 * general.layers['energy'].height_spread, 1e6 * general.spread
+    aligned = np.all(np.abs(off['thesis']) <= _ALIGNED)
+    claims = (
+        claim('simulated liquid agrees with', (*off['thesis'], *off['energy']), aligned, **off),
+        claim('round a general shape', (layers, exact), exact > 0.02e6 * general.height,
+              layers=layers, exact=exact),
+    )  # fmt: skip
+    return explained(26, figure, claims)
 
 
 def _figure_27() -> Explained:
     figure = Figure(figsize=(WIDE, 2.6), layout='constrained')
     left, right = figure.subplots(1, 2)
     found = bodies()['general shape'].layers['energy']
-    turns = np.radians(np.linspace(0.0, 360.0, 73))
-    left.plot(np.degrees(turns), [1e6 * found.section(a) for a in turns], color=BLUE)
+    turns = np.linspace(0.0, 360.0, 73)
+    radians = np.radians(turns)
+    left.plot(turns, [1e6 * found.section(a) for a in radians], color=BLUE)
     twin = left.twinx()
-    twin.plot(
-        np.degrees(turns), [1e6 * found.force(a) for a in turns], color=VERMILION, ls=(0, (4, 2))
-    )
+    pulls = [1e6 * found.force(a) for a in radians]
+    twin.plot(turns, pulls, color=VERMILION, ls=(0, (4, 2)))
     twin.spines['right'].set_visible(True)
     twin.set_ylim(None, 0.0)
     left.set(xticks=range(0, 361, 90), xlabel='direction of motion / °', ylim=(0.0, None))
@@ -271,68 +239,35 @@ def _figure_27() -> Explained:
     twin.set_ylabel('pressure × section / µN', color=VERMILION)
     left.set_title('(a) general shape')
 
-    readings = _readings_of_417()
-    names = ('4.18 with 4.17 as printed', '4.18, sign mended', 'exact, one half', 'exact, whole')
-    right.barh(
-        range(4), (*readings.forces, 0.0), color=(VERMILION, BLUE, GREEN, GREEN), height=0.6
+    # Equations 4.17 and 4.18 on the dome as printed, with the sign mended, and exact: forces on
+    # one half, µN, and pressures, Pa
+    ring = wet(Mesh.dome(*dome()), _HALF, axis=(0.0, 0.0))
+    true = bath_meniscus(*dome(), liquid=_HALF)
+    curvature, radius = float(ring.curvature_radius[0]), float(ring.ring_radii[0])
+    printed = _HALF.surface_tension * (1.0 / curvature + 1.0 / radius)
+    pressures = printed, -_HALF.density * GRAVITY * true.height, float(ring.pressure[0])
+    forces = (
+        1e6 * printed * ring.section(0.0),
+        1e6 * ring.force(0.0),
+        -1e6 * one_sided(true, _HALF),
     )
+    names = ('4.18 with 4.17 as printed', '4.18, sign mended', 'exact, one half', 'exact, whole')
+    right.barh(range(4), (*forces, 0.0), color=(VERMILION, BLUE, GREEN, GREEN), height=0.6)
     right.plot(0.0, 3, 'o', color=GREEN)
     right.set_yticks(range(4), names)
     right.invert_yaxis()
     right.axvline(0.0, color=BLACK, lw=0.7)
     right.set_xlabel('force along the motion / µN')
     right.set_title('(b) dome')
-    return explained(27, figure, _claims_27(readings))
-
-
-class _Readings(NamedTuple):
-    """Equations 4.17 and 4.18 on the dome, and the exact meniscus.
-
-    Forces on one half as printed, with the sign mended, and exact, µN; pressures as printed, with
-    the sign mended, and exact at the line, Pa.
-    """
-
-    forces: tuple[float, float, float]
-    printed: float
-    mended: float
-    exact: float
-
-
-def _readings_of_417() -> _Readings:
-    ring = wet(Mesh.dome(*dome()), _HALF, axis=(0.0, 0.0))
-    true = bath_meniscus(*dome(), liquid=_HALF)
-    curvature, radius = float(ring.curvature_radius[0]), float(ring.ring_radii[0])
-    printed = _HALF.surface_tension * (1.0 / curvature + 1.0 / radius)
-    exact_force = -1e6 * one_sided(true, _HALF)
-    forces = 1e6 * printed * ring.section(0.0), 1e6 * ring.force(0.0), exact_force
-    pressure = -_HALF.density * GRAVITY * true.height
-    return _Readings(forces, printed, float(ring.pressure[0]), pressure)
-
-
-def _claims_27(readings: _Readings) -> tuple[Claim, ...]:
-    forces = readings.forces
-    surface = lobed_surface()
-    net = 1e6 * float(np.hypot(*surface.force[:2]))
-    general = 1e6 * abs(bodies()['general shape'].layers['energy'].force(0.0))
-    return (
-        claim(
-            'the capillary force along',
-            f'Round the general shape it is {general:.2f} µN, of the surface of least energy '
-            f'{net:.4f}: opposite sides cancel. For one half of the dome 4.18 gives '
-            f'{forces[0]:+.1f} µN, {forces[1]:+.2f} with the sign of 4.17 mended; exact is '
-            f'{forces[2]:+.1f}, mostly the pull of the contact line, which 4.18 leaves out.',
-            (general, net, *forces),
-            net >= 0.5 * general,
-        ),
-        claim(
-            'the pressure is 1',
-            f'On the dome this gives {readings.printed:+.1f} Pa, but the pressure in raised '
-            f'liquid is below that of the air: {readings.exact:+.1f} Pa at the line. Ring and arc '
-            f'curve in opposite senses: γ(1/r - 1/R) is {readings.mended:+.1f} Pa.',
-            (readings.printed, readings.exact, readings.mended),
-            readings.printed < 0.0,
-        ),
-    )
+    net = 1e6 * float(np.hypot(*lobed_surface().force[:2]))
+    general = 1e6 * abs(found.force(0.0))
+    claims = (
+        claim('the capillary force along', (general, net, *forces), net >= 0.5 * general,
+              general=general, net=net, printed=forces[0], mended=forces[1], exact=forces[2]),
+        claim('the pressure is 1', pressures, printed < 0.0, printed=printed, exact=pressures[1],
+              mended=pressures[2]),
+    )  # fmt: skip
+    return explained(27, figure, claims)
 
 
 def _figure_28() -> Explained:
@@ -367,83 +302,42 @@ def _figure_28() -> Explained:
         Line2D([], [], color=VERMILION, lw=1.0, ls=(0, (4, 2)), label='exact meniscus'),
     ]
     legend(figure, handles)
-    curve = climbed(tension, 'energy')[1]
-    return explained(28, figure, _claims_28(layers, truths, curve))
-
-
-def _claims_28(layers: list[float], truths: list[float], curve: Array) -> tuple[Claim, ...]:
-    return (
-        claim(
-            'the level rises as',
-            'From panel to panel layers have '
-            + ', '.join(f'{each:.2f}' for each in layers)
-            + ' mm, the exact meniscus '
-            + ', '.join(f'{each:.2f}' for each in truths)
-            + ' mm.',
-            (*layers, *truths),
-            bool(np.all(np.diff(curve) > 0.0)) and _rising(truths),
-        ),
-        claim(
-            'only these tensions wet',
-            f'Under a dome liquid rises already at 90°, by {truths[0]:.2f} mm: it climbs where '
-            'contact angle and inclination of the wall add up to less than 180°.',
-            (truths[0],),
-            truths[0] <= 0.0,
-        ),
+    rising = _rising(climbed(tension, 'energy')[1]) and _rising(truths)
+    claims = (
+        claim('the level rises as', (*layers, *truths), rising, layers=layers, exact=truths),
+        claim('only these tensions wet', truths[0], truths[0] <= 0.0, rise=truths[0]),
     )
+    return explained(28, figure, claims)
+
+
+def _over(ax: Any, column: int, at: Callable[[float, float], tuple[float, float]]) -> None:
+    """Draw two columns of :func:`climbed` against each other, and exact points, mm and mN/m."""
+    for tension, colour in zip(TENSIONS, _COLOURS, strict=True):
+        for balance, style in _BALANCES.items():
+            x, y = climbed(tension, balance)[column : column + 2]
+            ax.plot(1e3 * x, 1e3 * y, color=colour, ls=style)
+        for degrees in _ANGLES:
+            ax.plot(*(1e3 * np.array(at(tension, degrees))), 'o', color=colour)
+    ax.set(xlim=(0.0, None), ylim=(0.0, None))
 
 
 def _figure_29() -> Explained:
     figure = Figure(figsize=(COLUMN, 2.9), layout='constrained')
     ax = figure.subplots()
-    for tension, colour in zip(TENSIONS, _COLOURS, strict=True):
-        for balance, style in _BALANCES.items():
-            solid, height, _ = climbed(tension, balance)
-            ax.plot(1e3 * solid, 1e3 * height, color=colour, ls=style)
-        for degrees in _ANGLES:
-            solid_tension = liquid_at(tension, degrees).solid_tension
-            height_there = exact(tension, degrees).height
-            ax.plot(1e3 * solid_tension, 1e3 * height_there, 'o', color=colour)
-    ax.set_xlim(0.0, None)
-    ax.set_ylim(0.0, None)
-    ax.set_xlabel('tension of the solid / (mN/m)')
-    ax.set_ylabel('wetted height / mm')
+    _over(ax, 0, lambda t, angle: (liquid_at(t, angle).solid_tension, exact(t, angle).height))
+    ax.set(xlabel='tension of the solid / (mN/m)', ylabel='wetted height / mm')
     legend(figure, _handles(), 3)
-    return explained(29, figure, _claims_29())
-
-
-def _claims_29() -> tuple[Claim, ...]:
     energy = [climbed(tension, 'energy')[1] for tension in TENSIONS]
-    truths = [[exact(tension, degrees).height for degrees in _ANGLES] for tension in TENSIONS]
-    middle = [1e3 * row[1] for row in truths]
-    last = [_slope_at_end(tension) for tension in TENSIONS]
-    return (
-        claim(
-            'the height rises with',
-            'Also with the balance of energy and on the exact meniscus, from '
-            f'{1e3 * truths[-1][0]:.2f} to {1e3 * truths[-1][-1]:.2f} mm for 4 mN/m.',
-            (truths[-1][0], truths[-1][-1]),
-            all(bool(np.all(np.diff(each) > 0.0)) for each in energy)
-            and all(_rising(each) for each in truths),
-        ),
-        claim(
-            'at the same contact',
-            'At a contact angle of 60° the exact heights are '
-            + ', '.join(f'{each:.2f}' for each in middle)
-            + ' mm.',
-            tuple(middle),
-            _rising(middle),
-        ),
-        claim(
-            'the height converges to',
-            'The highest point is the end of the range, a contact angle of 0°; over its last '
-            'twentieth the curves rise '
-            + ', '.join(f'{each:.1f}' for each in last)
-            + ' times as steeply as over the whole.',
-            tuple(last),
-            all(each < 0.1 for each in last),
-        ),
-    )
+    truths = [[1e3 * exact(t, degrees).height for degrees in _ANGLES] for t in TENSIONS]
+    middle, slopes = [row[1] for row in truths], [_slope_at_end(tension) for tension in TENSIONS]
+    low, high = truths[-1][0], truths[-1][-1]
+    claims = (
+        claim('the height rises with', (1e-3 * low, 1e-3 * high),
+              all(map(_rising, (*energy, *truths))), low=low, high=high),
+        claim('at the same contact', middle, _rising(middle), heights=middle),
+        claim('the height converges to', slopes, max(slopes) < 0.1, slopes=slopes),
+    )  # fmt: skip
+    return explained(29, figure, claims)
 
 
 def _slope_at_end(tension: float) -> float:
@@ -457,23 +351,14 @@ def _slope_at_end(tension: float) -> float:
 def _figure_30() -> Explained:
     figure = Figure(figsize=(COLUMN, 2.9), layout='constrained')
     ax = figure.subplots()
-    for tension, colour in zip(TENSIONS, _COLOURS, strict=True):
-        for balance, style in _BALANCES.items():
-            _, height, curvature = climbed(tension, balance)
-            ax.plot(1e3 * height, 1e3 * curvature, color=colour, ls=style)
-        for degrees in _ANGLES:
-            true = exact(tension, degrees)
-            curvature_there = exact_curvature(true, liquid_at(tension, degrees))
-            ax.plot(1e3 * true.height, 1e3 * curvature_there, 'o', color=colour)
-    ax.set_xlim(0.0, None)
-    ax.set_ylim(0.0, None)
-    ax.set_xlabel('wetted height / mm')
-    ax.set_ylabel('radius of curvature / mm')
+
+    def true(tension: float, degrees: float) -> tuple[float, float]:
+        found = exact(tension, degrees)
+        return found.height, exact_curvature(found, liquid_at(tension, degrees))
+
+    _over(ax, 1, true)
+    ax.set(xlabel='wetted height / mm', ylabel='radius of curvature / mm')
     legend(figure, _handles(), 3)
-    return explained(30, figure, _claims_30())
-
-
-def _claims_30() -> tuple[Claim, ...]:
     _, height, curvature = climbed(TENSIONS[-1], 'energy')
     shares = curvature / height
     _, height, curvature = climbed(TENSIONS[-1], 'thesis')
@@ -481,18 +366,12 @@ def _claims_30() -> tuple[Claim, ...]:
     cone = Mesh.cone(*_CONE, rings=24, sectors=48)
     on_cone = [wet(cone, liquid_at(tension, 45.0), slices=3) for tension in TENSIONS]
     same = [float(each.curvature_radius[0]) / each.mean_height for each in on_cone]
-    return (
-        claim(
-            'the radius of the',
-            f'On the dome it goes from {shares[0]:.2f} to {shares[-1]:.2f} times the height, with '
-            f'the balance of the thesis from {printed[0]:.2f} to {printed[-1]:.2f}; on a cone, at '
-            'one contact angle, it is '
-            + ', '.join(f'{each:.3f}' for each in same)
-            + ' times the height for the three liquids.',
-            (float(shares[0]), float(shares[-1]), *same),
-            bool(np.ptp(shares) <= 0.1 * np.mean(shares)),
-        ),
-    )
+    constant = np.ptp(shares) <= 0.1 * np.mean(shares)
+    claims = [
+        claim('the radius of the', (shares[0], shares[-1], *same), constant, first=shares[0],
+              last=shares[-1], first_of_thesis=printed[0], last_of_thesis=printed[-1], same=same)
+    ]  # fmt: skip
+    return explained(30, figure, claims)
 
 
 def _figure_31() -> Explained:
@@ -524,47 +403,22 @@ def _figure_31() -> Explained:
         )
     ax.set(xlabel='distance of neighbours / mm', ylabel='height / mm', ylim=(0.0, 2.2))
     ax.legend(loc='upper right', ncols=2, fontsize=7.0)
-    return explained(31, figure, _claims_31(true, limit))
-
-
-def _claims_31(true: list[float], limit: float) -> tuple[Claim, ...]:
     closest = filled(PITCHES[0], 'energy')
     ours, thesis = (
-        [
-            filled(pitch, balance).height / height - 1.0
-            for pitch, height in zip(PITCHES, true, strict=True)
-        ]
-        for balance in ('energy', 'thesis')
+        [filled(p, name).height / height - 1.0 for p, height in zip(PITCHES, true, strict=True)]
+        for name in ('energy', 'thesis')
     )
     off = [each for each in thesis if math.isfinite(each)]
-    return (
-        claim(
-            'the narrower the space',
-            'From 9 to 3.2 mm the surface of least energy rises from '
-            f'{1e3 * true[-1]:.2f} to {1e3 * true[0]:.2f} mm. The rise has a limit, unlike in a '
-            f'tube: where the slope of the wall is the contact angle, {1e3 * limit:.2f} mm.',
-            (true[-1], true[0], limit),
-            _rising(true[::-1]) and true[0] < limit,
-            rule=f'Rises at each of {len(true)} distances. Size and distance of the domes are '
-            'assumed; the liquid is water.',
-        ),
-        claim(
-            'the balance of all',
-            f"The thesis' balance is off by {_percents(off)} at {len(off)} of {len(PITCHES)} "
-            'distances, else over the top of the domes; the balance of energy by '
-            f'{_percents(ours)}. A level surface leaves out the meniscus at each dome.',
-            (*off, *ours),
-            len(off) == len(PITCHES) and all(abs(each) <= _ALIGNED for each in off),
-        ),
-        claim(
-            'a layer of liquid',
-            'As printed an area is taken from a volume. With dz in both terms, '
-            f'{1e9 * closest.volume:.2f} mm³ of water surround each dome 3.2 mm from its '
-            'neighbours.',
-            (closest.volume,),
-            False,
-        ),
-    )
+    good = len(off) == len(PITCHES) and max(map(abs, off)) <= _ALIGNED
+    claims = (
+        claim('the narrower the space', (true[-1], true[0], limit),
+              _rising(true[::-1]) and true[0] < limit, low=1e3 * true[-1], high=1e3 * true[0],
+              limit=1e3 * limit, count=len(true)),
+        claim('the balance of all', (*off, *ours), good, off=off, ours=ours, count=len(off),
+              all=len(PITCHES)),
+        claim('a layer of liquid', closest.volume, False, volume=1e9 * closest.volume),
+    )  # fmt: skip
+    return explained(31, figure, claims)
 
 
 def _solid(ax: Any, mesh: Mesh, found: Wet | WetPattern, zoom: float) -> None:
@@ -600,9 +454,5 @@ def _handles() -> list[Line2D]:
     return [*liquids, *balances, Line2D([], [], color=BLACK, marker='o', ls='', label='exact')]
 
 
-def _rising(values: list[float]) -> bool:
-    return all(low < high for low, high in itertools.pairwise(values))
-
-
-def _percents(shares: list[float]) -> str:
-    return ', '.join(f'{100.0 * each:+.0f}' for each in shares) + ' %'
+def _rising(values: Any) -> bool:
+    return bool(np.all(np.diff(values) > 0.0))

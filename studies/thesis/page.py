@@ -153,14 +153,7 @@ def write_bench(
     """
     scene = trial.scene
     facts = f'bench · {FIDELITY} · foot {scene.foot.source} · ros_pad {ros_pad.__version__}'
-    bounds = [
-        [
-            html.escape(each.term),
-            'unknown' if each.bound is None else f'≤ {100.0 * each.bound:.2g} %',
-            html.escape(each.reason),
-        ]
-        for each in trial.omitted
-    ]
+    bounds = [[*map(html.escape, each.words())] for each in trial.omitted]
     points = [[html.escape(text) for text in cells(row)] for row in trial.rows]
     parts = [
         f'<h1>{html.escape(scene.name)}</h1><p class="facts">{html.escape(facts)}</p>',

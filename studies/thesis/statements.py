@@ -49,27 +49,12 @@ def _energy() -> tuple[Claim, ...]:
     pull = 2.0 * math.pi * LARGE_PAD.adhesion_energy * float(touching.sphere_radius)
     text = math.sqrt((light - pull) / (math.pi * PRESSURE))
     return (
-        claim(
-            'the energy of a',
-            f'As ∫T dS the same k gives a dome {1e3 * right:.2f} mm high at 75 kPa in place of '
-            f'{1e3 * height:.2f} mm.',
-            (right, height),
-            bool(abs(right / height - 1.0) <= MINIMAL),
-        ),
-        claim(
-            'adhesion costs energy 3',
-            f'At 1 mN the contact radius is {100 * (text / program - 1):+.1f} % from that with '
-            'the plus of the appendix.'.replace('-', '−'),
-            (text, program),
-            text > program,
-        ),
-        claim(
-            'contact radius and depth',
-            f'b/R = {_few(slender, ".2f")} at {_few(FORCES, "g")} N.',
-            tuple(slender.tolist()),
-            bool(np.all(slender <= MINIMAL)),
-        ),
-    )
+        claim('the energy of a', (right, height), abs(right / height - 1.0) <= MINIMAL,
+              right=1e3 * right, height=1e3 * height),
+        claim('adhesion costs energy 3', (text, program), text > program, off=text / program - 1),
+        claim('contact radius and depth', slender, np.all(slender <= MINIMAL), slender=slender,
+              forces=FORCES),
+    )  # fmt: skip
 
 
 def _ring() -> tuple[Claim, ...]:
@@ -78,148 +63,76 @@ def _ring() -> tuple[Claim, ...]:
     right, printed = (meniscus(pressed, WATER, each) for each in ('corrected', 'thesis'))
     ring, height = np.asarray(right.ring_radius), np.asarray(right.height)
     wrong = (2.0 * ring + height) / (2.0 * ring - height)
-    exact = np.array([
-        bath_meniscus(float(sphere), float(contact), liquid=WATER).height
-        for sphere, contact in zip(np.asarray(pressed.sphere_radius), b, strict=True)
-    ])  # fmt: skip
-    off = np.asarray(printed.height) / exact
+    domes = zip(np.asarray(pressed.sphere_radius).tolist(), b.tolist(), strict=True)
+    exact = np.array([bath_meniscus(*dome, liquid=WATER).height for dome in domes])
+    off, share = np.asarray(printed.height) / exact, b / ring
     return (
-        claim(
-            'a ring of liquid',
-            'The other half of the ring pulls back: the sum is 0. What is left is the hysteresis '
-            'of the contact angle, of which Fig. 21 has the bound.',
-            (0.0,),
-            False,
-        ),
-        claim(
-            'ring and arc curve',
-            f'That makes the force {_few(wrong, ".1f")} times as large (water, '
-            f'{_few(FORCES, "g")} N).',
-            tuple(wrong.tolist()),
-            bool(np.all(np.abs(wrong - 1.0) <= MINIMAL)),
-        ),
-        claim(
-            'contact and ring have',
-            f'b/r = {_few(b / ring, ".2f")} for water at {_few(FORCES, "g")} N.',
-            tuple((b / ring).tolist()),
-            bool(np.all(b / ring >= 1.0 - MINIMAL)),
-        ),
-        claim(
-            'height to which liquid',
-            f'{_few(off, ".1f")} times the exact meniscus of a wide bath (water, '
-            f'{_few(FORCES, "g")} N).',
-            tuple(off.tolist()),
-            bool(np.all(np.abs(off - 1.0) <= MINIMAL)),
-        ),
-    )
+        claim('a ring of liquid', 0.0, False),
+        claim('ring and arc curve', wrong, np.all(np.abs(wrong - 1.0) <= MINIMAL), wrong=wrong,
+              forces=FORCES),
+        claim('contact and ring have', share, np.all(share >= 1.0 - MINIMAL), share=share,
+              forces=FORCES),
+        claim('height to which liquid', off, np.all(np.abs(off - 1.0) <= MINIMAL), off=off,
+              forces=FORCES),
+    )  # fmt: skip
 
 
 def _domes() -> tuple[Claim, ...]:
     area = 1.5 * 2.0 * (1.5 + math.sqrt(1.25))  # of the dome with R = 1.5 r, over π r²
+    stretch = math.sqrt(area) - 1.0
     r, k = LARGE_PAD.radius, LARGE_PAD.stiffness
     needed = TENSION['corrected'] * k / r
     end = largest_pressure(LARGE_PAD, 'flattening')
     widest = float(inflate(LARGE_PAD, end).sphere_radius) / r
     return (
-        claim(
-            'area of a dome',
-            f'{area:.2f} π r₀², {100 * (math.sqrt(area) - 1):.0f} %.',
-            (area, math.sqrt(area) - 1.0),
-            abs(area / 7.8 - 1.0) <= 0.01 and abs((math.sqrt(area) - 1.0) / 1.8 - 1.0) <= 0.01,
-        ),
-        claim(
-            'domes work at r',
-            f'That takes {1e-3 * needed:.0f} kPa; a pressed dome of this pad has one answer up to '
-            f'{1e-3 * end:.1f} kPa, where R = {widest:.2f} r₀.',
-            (needed, end),
-            needed <= end,
-        ),
-    )
+        claim('area of a dome', (area, stretch),
+              abs(area / 7.8 - 1.0) <= 0.01 and abs(stretch / 1.8 - 1.0) <= 0.01,
+              area=area, stretch=stretch),
+        claim('domes work at r', (needed, end), needed <= end, needed=1e-3 * needed,
+              end=1e-3 * end, widest=widest),
+    )  # fmt: skip
 
 
 def _soles() -> tuple[Claim, ...]:
     pads = CELLS['corrected'] / CELLS['thesis']
     pressure, force = (each['thesis'] / each['corrected'] for each in (TENSION, FLAT))
     small = resized(dataclasses.replace(LARGE_PAD, thickness=None), 0.5e-3)
-    small = dataclasses.replace(small, thickness=LARGE_PAD.thickness)
-    per_area = [
-        {c: float(force_limit(pad, PRESSURE, c)) / (math.pi * pad.radius**2) for c in _LIMITS}
-        for pad in (small, LARGE_PAD)
-    ]
+    both = dataclasses.replace(small, thickness=LARGE_PAD.thickness), LARGE_PAD
+    per_area = {
+        c: [float(force_limit(pad, PRESSURE, c)) / (math.pi * pad.radius**2) for pad in both]
+        for c in ('thickness', 'flattening')
+    }
     return (
-        claim(
-            'number of pads on',
-            f'{pads:.2f} times as many as fit: even flat ones overlap.',
-            (pads,),
-            abs(pads - 1.0) <= MINIMAL,
-        ),
-        claim(
-            'pressure for r 1',
-            f'{TENSION["corrected"]:.4f} k/r₀.',
-            (pressure,),
-            abs(pressure - 1.0) <= 0.01,
-        ),
-        claim(
-            'force that presses all',
-            f'{FLAT["corrected"]:.3f} k S/r₀, {force:.2f} times less.',
-            (force,),
-            abs(force - 1.0) <= MINIMAL,
-        ),
-        claim(
-            'smaller pads carry more',
-            'Load over area at 75 kPa, pads of 0.5 and 1.5 mm of one sheet: '
-            + '; '.join(
-                f'{1e-3 * per_area[0][c]:.1f} and {1e-3 * per_area[1][c]:.1f} kPa by `{c}`'
-                for c in _LIMITS
-            )
-            + '.',
-            tuple(each[c] for each in per_area for c in _LIMITS),
-            all(per_area[0][c] > per_area[1][c] for c in _LIMITS),
-        ),
-    )
-
-
-_LIMITS = ('thickness', 'flattening')
+        claim('number of pads on', pads, abs(pads - 1.0) <= MINIMAL, pads=pads),
+        claim('pressure for r 1', pressure, abs(pressure - 1.0) <= 0.01,
+              tension=TENSION['corrected']),
+        claim('force that presses all', force, abs(force - 1.0) <= MINIMAL,
+              flat=FLAT['corrected'], force=force),
+        claim('smaller pads carry more', np.transpose([*per_area.values()]),
+              all(one > other for one, other in per_area.values()),
+              **{c: 1e-3 * np.array(loads) for c, loads in per_area.items()}),
+    )  # fmt: skip
 
 
 def _pad() -> tuple[Claim, ...]:
     stretch = math.sqrt(1.0 + (2.0e-3 / LARGE_PAD.radius) ** 2)
-    tenfold = dataclasses.replace(LARGE_PAD, adhesion_energy=0.06)
-    wider = float(
-        press(tenfold, PRESSURE, 0.08).contact_radius
-        / press(LARGE_PAD, PRESSURE, 0.08).contact_radius
+    sticky, usual = (
+        float(press(pad, PRESSURE, 0.08).contact_radius)
+        for pad in (dataclasses.replace(LARGE_PAD, adhesion_energy=0.06), LARGE_PAD)
     )
     tensions = 2.0 * math.sqrt(WATER.solid_tension * 0.04)
     return (
-        claim(
-            'strain stays where rubber',
-            f'Measured at 75 kPa the cap is 2.0 mm high, its mean stretch {stretch:.2f}.',
-            (stretch,),
-            stretch <= 1.1,
-        ),
-        claim(
-            'adhesion energy 2 of',
-            f'About {tensions:.2g} J/m², with 0.027 and 0.04 N/m. The contact at 0.08 N is '
-            f'{100 * (wider - 1):.1f} % wider by it.',
-            (tensions,),
-            abs(tensions / 0.006 - 1.0) <= 1.0,
-        ),
-    )
+        claim('strain stays where rubber', stretch, stretch <= 1.1, stretch=stretch),
+        claim('adhesion energy 2 of', tensions, abs(tensions / 0.006 - 1.0) <= 1.0,
+              tensions=tensions, wider=sticky / usual - 1.0),
+    )  # fmt: skip
 
 
 # --- chapters 4 and 5 ----------------------------------------------------------------------------
 
 
 def _layers() -> tuple[Claim, ...]:
-    return (
-        claim(
-            'the energy of a 2',
-            'Its two losses, 4.7 and 4.10, are equal and have opposite signs in 4.12: Q = W stays '
-            'above 0 at every layer, and the loop does not end.',
-            (0.0,),
-            False,
-        ),
-    )
+    return (claim('the energy of a 2', 0.0, False),)
 
 
 def _feet() -> tuple[Claim, ...]:
@@ -229,16 +142,10 @@ def _feet() -> tuple[Claim, ...]:
     return (
         _balloons('large', 1.5e-3, 0.4e-3, '5.1.1'),
         _balloons('small', 0.5e-3, 0.2e-3, '5.1.2'),
-        claim(
-            'the small foot is',
-            f'{small.pads} pads of 0.5 mm, flat at {carried:.1f} N at {1e-3 * small.ceiling:.0f} '
-            'kPa, '
-            f'the most that they bear; a tripod of the hexapod puts {robot:.1f} N on each foot.',
-            (carried, robot),
-            None,
-        ),
-        claim('at high pressure the', 'Soles are rigid here.', (), None),
-    )
+        claim('the small foot is', (carried, robot), None, pads=small.pads, carried=carried,
+              ceiling=1e-3 * small.ceiling, robot=robot),
+        claim('at high pressure the', (), None),
+    )  # fmt: skip
 
 
 def _balloons(name: str, radius: float, thickness: float, section: str) -> Claim:
@@ -248,64 +155,31 @@ def _balloons(name: str, radius: float, thickness: float, section: str) -> Claim
         1e-3 * largest_pressure(Pad.of(sheet.times(factor), radius, thickness), 'flattening')
         for factor in (sheet.factor_range[0], 1.0, sheet.factor_range[1])
     )
-    least = 1e-3 * min(WALKED)
+    walked = [1e-3 * p for p in WALKED]
     return claim(
-        'pads of the large',
-        f'Such a membrane balloons at {given:.1f} kPa ({low:.1f} to {high:.1f}, by the doubts '
-        'about the material, which was not tested).',
-        (low, given, high),
-        high >= least,
-        thesis=f'Pads of the {name} foot, Ecoflex 00-20, {1e3 * thickness:g} mm thick, walk at '
-        'these pressures.',
-        section=section,
-        printed=f'{_few([1e-3 * p for p in WALKED], "g")} kPa',
-        rule=f'Stands at {least:g} kPa, with the stiffest that the material may be.',
-    )
+        'pads of the large', (low, given, high), high >= min(walked), low=low, given=given,
+        high=high, name=name, thickness=1e3 * thickness, section=section, walked=walked,
+        least=min(walked),
+    )  # fmt: skip
 
 
 def _walks() -> tuple[Claim, ...]:
     foot = Foot.load('large19')
     dry = {}
-    for critical in (0.5, 1.0, 2.0):
+    for name, critical in (('half', 0.5), ('one', 1.0), ('two', 2.0)):
         own = dataclasses.replace(foot, critical_film=critical * foot.critical_film)
-        film = Film(own)
-        shares = []
+        film, shares = Film(own), []
         for pressure in WALKED:
             film.touch_down(FILM)
             film.drain(LOAD, 0.0, pressure, 0.5)
             shares.append(math.exp(-((film.under_domes / own.critical_film) ** own.film_exponent)))
-        dry[critical] = shares
+        dry[name] = np.array(shares)
     radius, water = foot.pad.radius, WATER.surface_tension
-    bound = foot.pads * (
-        capillary_pull(radius, FILM, WATER)
-        + hysteresis_force(radius, water, math.pi, 0.0) / foot.friction
-    ) / LOAD  # fmt: skip
+    pinned = hysteresis_force(radius, water, math.pi, 0.0) / foot.friction
+    bound = foot.pads * (capillary_pull(radius, FILM, WATER) + pinned) / LOAD
     return (
-        claim(
-            'domes of low pressure',
-            'By films alone, at 40, 60 and 75 kPa, '
-            + '; '.join(
-                f'{_few([100 * s for s in shares], ".0f")} % is dry (critical film '
-                f'{1e6 * factor * foot.critical_film:g} µm)'
-                for factor, shares in dry.items()
-            )
-            + '. In the walks domes of 40 kPa fail because the measured line has them pressed '
-            'flat.',
-            tuple(np.ravel(list(dry.values())).tolist()),
-            None,
-        ),
-        claim(
-            'uneven liquid still adds',
-            f'Walks leave it out. On ground that stays {1e3 * FILM:g} mm deep, at rest, it is at '
-            f'most {100.0 * bound:.1f} % of the friction of a loaded foot on domes (pull of the '
-            'liquid and pinned lines); where the liquid round the sole has thinned there is no '
-            'such bound.',
-            (bound,),
-            None,
-        ),
-    )
-
-
-def _few(values: object, form: str) -> str:
-    words = [f'{value:{form}}' for value in np.ravel(np.asarray(values)).tolist()]
-    return ' and '.join([', '.join(words[:-1]), words[-1]] if len(words) > 1 else words)
+        claim('domes of low pressure', [*dry.values()], None,
+              **{name: 100 * shares for name, shares in dry.items()},
+              films=[factor * 1e6 * foot.critical_film for factor in (0.5, 1.0, 2.0)]),
+        claim('uneven liquid still adds', bound, None, film=1e3 * FILM, bound=bound),
+    )  # fmt: skip

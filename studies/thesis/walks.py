@@ -6,6 +6,7 @@ The thesis gives no data points of these walks, so they are compared with its te
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
@@ -29,7 +30,7 @@ from ros_pad.reports.style import (
 from ros_pad.reports.view import view_of
 from ros_pad.trials import loop
 from ros_pad.trials.trial import Trial
-from studies.thesis.explained import MINIMAL, Claim, Explained, claim, explained
+from studies.thesis.explained import MINIMAL, Explained, claim, explained, worded
 
 # Scene, text, colour and line style of each case, in the thesis' order.
 RAIL: dict[str, tuple[str, str, Any]] = {
@@ -80,165 +81,109 @@ def walk(
 
 def draw(walks: Walks, numbers: Collection[int] = NUMBERS) -> list[Explained]:
     """Draw some of the figures from the walks that they need."""
-    makers: dict[int, Callable[[], Explained]] = {
-        38: lambda: _figure_38(walks),
-        39: lambda: _figure_39(walks),
-        **{
-            number: lambda number=number, floor=floor: (  # type: ignore[misc]
-                _feet(walks, number, floor) if number < 43 else _paths(walks, number, floor)
-            )
-            for number, floor in FLOOR_OF.items()
-        },
-    }
+    makers: dict[int, Callable[[Walks, int], Explained]] = {38: _figure_38, 39: _figure_39}
+    makers |= {41: _feet, 42: _feet, 43: _paths, 44: _paths}
     with matplotlib.rc_context(PAPER_STYLE):
-        return [makers[number]() for number in NUMBERS if number in numbers]
+        return [makers[number](walks, number) for number in NUMBERS if number in numbers]
+
+
+def _part(trial: Trial, first: int, cycles: int) -> np.ndarray:
+    """Return which samples are of some gait cycles."""
+    start, cycle = trial.settings['settle_s'], trial.settings['cycle_s']
+    start += first * cycle
+    return (trial.time >= start) & (trial.time <= start + cycles * cycle)
 
 
 # --- the leg on its rail -------------------------------------------------------------------------
 
 
-def _figure_38(walks: Walks) -> Explained:
-    shown = {name: RAIL[name][0] for name in ('leg_dry_flat', 'leg_wet_flat', 'leg_wet_dome_75')}
+def _figure_38(walks: Walks, number: int) -> Explained:
+    shown = ('leg_dry_flat', 'leg_wet_flat', 'leg_wet_dome_75')
     figure = Figure(figsize=(WIDE, 1.9), layout='constrained')
     axes = figure.subplots(1, 3, sharey=True)
-    slips = {}
-    for ax, letter, (name, words) in zip(axes, 'abc', shown.items(), strict=True):
+    for ax, letter, name in zip(axes, 'abc', shown, strict=True):
         trial = walks[name, 0]
-        view = view_of(trial)
-        start = trial.settings['settle_s'] + 2.0 * trial.settings['cycle_s']
-        rows = (trial.time >= start) & (trial.time <= start + 4.0 * trial.settings['cycle_s'])
+        rows = _part(trial, 2, 4)
         x, _, z = 1e3 * trial.position[rows, 0].T
-        standing = trial.standing(view.load_gate)[rows, 0]
-        ground = walks[name, 0].floor
-        if ground is not None and ground.wet(0.0, 0.0):
-            ax.axhspan(-3.0, 0.0, color=WET, lw=0.0)
-        else:
-            ax.axhspan(-3.0, 0.0, color='#E4E4E4', lw=0.0)
+        standing = trial.standing(view_of(trial).load_gate)[rows, 0]
+        watered = trial.floor is not None and trial.floor.wet(0.0, 0.0)
+        ax.axhspan(-3.0, 0.0, color=WET if watered else _DRY, lw=0.0)
         x = x - x[0]
         ax.plot(np.where(standing, np.nan, x), z, color=BLACK, lw=1.0)
         ax.plot(np.where(standing, x, np.nan), z, color=VERMILION, lw=3.0)
-        ax.set_title(f'({letter}) {words}')
-        ax.set_xlabel('x / mm')
+        ax.set(title=f'({letter}) {RAIL[name][0]}', xlabel='x / mm')
         ax.set_xlim(x.min() - 8.0, x.min() + 215.0)
-        slips[name] = _slip_a_cycle(trial)[0]
-    axes[0].set_ylabel('z / mm')
-    axes[0].set_ylim(-3.0, 25.0)
-    legend(
-        figure,
-        [
-            Line2D([], [], color=BLACK, lw=1.0, label='foot in the air'),
-            Line2D([], [], color=VERMILION, lw=3.0, label='standing: a long stroke is slip'),
-            Line2D([], [], color='#E4E4E4', lw=5.0, label='dry floor'),
-            Line2D([], [], color=WET, lw=5.0, label='wet floor'),
-        ],
+    axes[0].set(ylabel='z / mm', ylim=(-3.0, 25.0))
+    keys = ((BLACK, 1.0, 'foot in the air'), (VERMILION, 3.0, 'standing: a long stroke is slip'),
+            (_DRY, 5.0, 'dry floor'), (WET, 5.0, 'wet floor'))  # fmt: skip
+    legend(figure, [Line2D([], [], color=c, lw=w, label=text) for c, w, text in keys])
+    dry, wet, dome = (_slip_a_cycle(walks[name, 0])[0] for name in shown)
+    stroke = 1e3 * walks[shown[0], 0].settings['stride_m']
+    claims = (
+        claim('dry the flat foot', dry, dry <= STRAIGHT * stroke, dry=dry, stroke=stroke),
+        claim('wet the flat foot', wet, wet > 0.5 * stroke, wet=wet, stroke=stroke),
+        claim('wet domes of high', dome, dome <= MINIMAL * stroke, dome=dome, stroke=stroke),
     )
-    stroke = 1e3 * walks['leg_dry_flat', 0].settings['stride_m']
-    return explained(
-        38,
-        figure,
-        _claims_38(slips, stroke),
-        alt='Paths of the foot over four gait cycles. Slip in a cycle: '
-        + ', '.join(f'{shown[name]} {slip:.1f} mm' for name, slip in slips.items()),
-    )
+    slips = zip(shown, (dry, wet, dome), strict=True)
+    words = ', '.join(f'{RAIL[name][0]} {slip:.1f} mm' for name, slip in slips)
+    return explained(number, figure, claims, slips=words)
 
 
-def _claims_38(slips: Mapping[str, float], stroke: float) -> tuple[Claim, ...]:
-    dry, wet, dome = slips.values()
-    return (
-        claim(
-            'dry the flat foot',
-            f'It slips {dry:.1f} mm a cycle, of a stroke of {stroke:g} mm (1 walk, L0).',
-            (dry,),
-            dry <= STRAIGHT * stroke,
-        ),
-        claim(
-            'wet the flat foot',
-            f'It slips {wet:.1f} of {stroke:g} mm (1 walk, L0).',
-            (wet,),
-            wet > 0.5 * stroke,
-        ),
-        claim(
-            'wet domes of high',
-            f'They slip {dome:.1f} of {stroke:g} mm (1 walk, L0).',
-            (dome,),
-            dome <= MINIMAL * stroke,
-        ),
-    )
+_DRY = '#E4E4E4'
 
 
-def _figure_39(walks: Walks) -> Explained:
+def _figure_39(walks: Walks, number: int) -> Explained:
     figure = Figure(figsize=(WIDE, 2.6), layout='constrained')
     ax = figure.subplots()
-    times, advances = {}, {}
+    found = {name: walks[name, 0].metrics for name in RAIL}
     for name, (words, colour, style) in RAIL.items():
-        trial = walks[name, 0]
-        assert trial.metrics is not None
-        goal = trial.metrics.goal_m or 0.0
-        times[name] = trial.metrics.time_to_goal_s
-        advances[name] = trial.metrics.distance_per_cycle_m
+        trial, metrics = walks[name, 0], found[name]
+        assert metrics is not None
+        goal = metrics.goal_m or 0.0
         rows = trial.body[:, 0] <= goal
         time = trial.time - trial.settings['settle_s']
         ax.plot(time[rows], 1e3 * trial.body[rows, 0], color=colour, ls=style, label=words)
     ax.axhline(1e3 * goal, color=PALE, lw=0.9)
     ax.annotate('end of the rail', (ax.get_xlim()[1], 1e3 * goal), (0, 3), ha='right',
                 textcoords='offset points')  # fmt: skip
-    ax.set_xlim(0.0, None)
-    ax.set_ylim(0.0, 1.12e3 * goal)
-    ax.set_xlabel('time / s')
-    ax.set_ylabel('distance of the body / mm')
+    ax.set(xlabel='time / s', ylabel='distance of the body / mm')
+    ax.set(xlim=(0.0, None), ylim=(0.0, 1.12e3 * goal))
     legend(figure, ax.get_legend_handles_labels()[0])
+    times = {name: each.time_to_goal_s for name, each in found.items() if each}
+    advances = {name: each.distance_per_cycle_m for name, each in found.items() if each}
+    dry, flat, low, middle, high = (math.inf if t is None else t for t in times.values())
     less = advances['leg_wet_dome_75'] / advances['leg_dry_flat'] - 1.0
-    return explained(
-        39,
-        figure,
-        _claims_39(times, less),
-        alt='Distance of the body over time; it is at the end of the rail after '
-        + ', '.join(f'{_seconds(times[name])} ({RAIL[name][0]})' for name in RAIL),
-    )
-
-
-def _claims_39(times: Mapping[str, float | None], less: float) -> tuple[Claim, ...]:
-    dry, flat, low, middle, high = (
-        float('inf') if each is None else each for each in times.values()
-    )
-    return (
-        claim(
-            'domes of 75 kpa',
-            f'They go {100.0 * abs(less):.0f} % less far in a cycle, and need '
-            f'{high:.1f} s in place of {dry:.1f} s (1 walk each, L0).',
-            (less,),
-            abs(less) <= MINIMAL,
-        ),
-        claim(
-            'wet flat feet need',
-            f'{flat / high:.1f} times: {flat:.1f} and {high:.1f} s (1 walk each, L0). With one '
-            'assumed number halved or doubled 1.3 to 7.2 times, or the flat foot never arrives.',
-            (flat / high,),
-            abs(flat / high / 5.0 - 1.0) <= ABOUT,
-        ),
-        claim(
-            'of 40 60 and',
-            f'{low:.1f}, {middle:.1f} and {high:.1f} s to the goal (1 walk each, L0).',
-            (low, middle, high),
-            low > middle > high,
-        ),
-    )
+    claims = (
+        claim('domes of 75 kpa', less, abs(less) <= MINIMAL, less=abs(less), high=high, dry=dry),
+        claim('wet flat feet need', flat / high, abs(flat / high / 5.0 - 1.0) <= ABOUT,
+              ratio=flat / high, flat=flat, high=high),
+        claim('of 40 60 and', (low, middle, high), low > middle > high,
+              times=(low, middle, high)),
+    )  # fmt: skip
+    shown = [f'{"never" if t is None else f"{t:.1f} s"} ({RAIL[n][0]})' for n, t in times.items()]
+    return explained(number, figure, claims, times=', '.join(shown))
 
 
 # --- the hexapod ---------------------------------------------------------------------------------
 
 
-def _feet(walks: Walks, number: int, floor: str) -> Explained:
+def _feet(walks: Walks, number: int) -> Explained:
+    floor = FLOOR_OF[number]
     middle, others = _slips_by_case(walks, floor)
     stride = 1e3 * walks[f'hexapod_{floor}_dry_flat', SEEDS[0]].settings['stride_m']
-    return explained(
-        number,
-        _draw_feet(walks, floor),
-        _slip_claims(number, middle, others, stride),
-        alt=f'Path of feet 2 and 5 over time on the {floor} floor. Slip in a cycle: '
-        + ', '.join(f'{CASES[case][0]} {each.mean():.0f} mm' for case, each in middle.items()),
-        title=f'Figure {number}: feet of legs 2 and 5 on the {floor} floor',
-    )
+    largest = max(middle['dry_flat'].max(), others['dry_flat'].max())
+    wet, dome = middle['wet_flat'], middle['wet_dome']
+    more, left, ratio = wet / middle['dry_flat'], dome / wet, wet / others['wet_flat']
+    at: dict[str, Any] = {'figure': number, 'seeds': f'{len(SEEDS)} floors, L2'}
+    claims = (
+        claim('dry nothing slips', largest, largest <= MINIMAL * stride, largest=largest,
+              stride=stride, **at),
+        claim('wet flat feet slip', more, np.all(more > 2.0), slips=wet, more=more, **at),
+        claim('domes take away much', left, np.all(left <= 0.5), slips=dome, left=left, **at),
+        claim('legs 2 and 5', ratio, np.all(ratio > 1.0 + MINIMAL), ratio=ratio, **at),
+    )  # fmt: skip
+    slips = ', '.join(f'{CASES[case][0]} {each.mean():.0f} mm' for case, each in middle.items())
+    return explained(number, _draw_feet(walks, floor), claims, slips=slips, floor=floor)
 
 
 def _draw_feet(walks: Walks, floor: str) -> Figure:
@@ -246,28 +191,21 @@ def _draw_feet(walks: Walks, floor: str) -> Figure:
     axes = figure.subplots(2, 3, sharex=True, sharey=True)
     for column, (case, (words, _, _)) in enumerate(CASES.items()):
         trial = walks[f'hexapod_{floor}_{case}', SEEDS[0]]
-        view = view_of(trial)
-        standing = trial.standing(view.load_gate)
-        start = trial.settings['settle_s'] + 5.0 * trial.settings['cycle_s']
-        rows = (trial.time >= start) & (trial.time <= start + 5.0 * trial.settings['cycle_s'])
-        time = trial.time[rows] - start
+        rows = _part(trial, 5, 5)
+        standing = trial.standing(view_of(trial).load_gate)[rows]
+        time = trial.time[rows]
         for ax, leg in zip(axes[:, column], (2, 5), strict=True):
             index = trial.legs.index(leg)
-            x = 1e3 * trial.position[rows, index, 0]
+            x, stands = 1e3 * trial.position[rows, index, 0], standing[:, index]
             x = x - x[0]
-            ax.plot(time, np.where(standing[rows, index], np.nan, x), color=BLACK, lw=0.9)
-            ax.plot(time, np.where(standing[rows, index], x, np.nan), color=VERMILION, lw=2.0)
+            ax.plot(time - time[0], np.where(stands, np.nan, x), color=BLACK, lw=0.9)
+            ax.plot(time - time[0], np.where(stands, x, np.nan), color=VERMILION, lw=2.0)
             if column == 0:
                 ax.set_ylabel(f'leg {leg}: x / mm')
         axes[0, column].set_title(f'({"abc"[column]}) {words}')
         axes[1, column].set_xlabel('time / s')
-    legend(
-        figure,
-        [
-            Line2D([], [], color=BLACK, lw=0.9, label='foot in the air'),
-            Line2D([], [], color=VERMILION, lw=2.0, label='standing: level where it holds'),
-        ],
-    )
+    keys = (BLACK, 0.9, 'foot in the air'), (VERMILION, 2.0, 'standing: level where it holds')
+    legend(figure, [Line2D([], [], color=c, lw=w, label=text) for c, w, text in keys])
     return figure
 
 
@@ -278,127 +216,48 @@ def _slips_by_case(walks: Walks, floor: str) -> tuple[Slips, Slips]:
     """Return the mean slip of legs 2 and 5, and the mean slip of the other legs."""
     middle, others = {}, {}
     for case in CASES:
-        slips = np.array([_slip_a_cycle(walks[f'hexapod_{floor}_{case}', s]) for s in SEEDS])
-        legs = np.array(walks[f'hexapod_{floor}_{case}', SEEDS[0]].legs)
-        at = np.isin(legs, (2, 5))
+        trials = [walks[f'hexapod_{floor}_{case}', seed] for seed in SEEDS]
+        slips = np.array([_slip_a_cycle(trial) for trial in trials])
+        at = np.isin(np.array(trials[0].legs), (2, 5))
         middle[case], others[case] = slips[:, at].mean(axis=1), slips[:, ~at].mean(axis=1)
     return middle, others
 
 
-def _slip_claims(number: int, middle: Slips, others: Slips, stride: float) -> tuple[Claim, ...]:
-    largest = max(middle['dry_flat'].max(), others['dry_flat'].max())
-    more = middle['wet_flat'] / middle['dry_flat']
-    left = middle['wet_dome'] / middle['wet_flat']
-    ratio = middle['wet_flat'] / others['wet_flat']
-    seeds = f'{len(SEEDS)} floors, L2'
-    return (
-        claim(
-            'dry nothing slips',
-            f'Feet slip at most {largest:.0f} mm a cycle, of a stride of {stride:g} mm, when they '
-            f'land ({seeds}).',
-            (float(largest),),
-            bool(largest <= MINIMAL * stride),
-            figure=number,
-        ),
-        claim(
-            'wet flat feet slip',
-            f'Legs 2 and 5 slip {_few(middle["wet_flat"])} mm a cycle, {_few(more, ".1f")} '
-            f'times as much as on dry ground ({seeds}).',
-            tuple(more.tolist()),
-            bool(np.all(more > 2.0)),
-            figure=number,
-        ),
-        claim(
-            'domes take away much',
-            f'{_few(100.0 * left)} % of it remain: {_few(middle["wet_dome"])} mm ({seeds}).',
-            tuple(left.tolist()),
-            bool(np.all(left <= 0.5)),
-            figure=number,
-        ),
-        claim(
-            'legs 2 and 5',
-            f'Wet and flat they slip {_few(ratio, ".2f")} times as much as the others ({seeds}).',
-            tuple(ratio.tolist()),
-            bool(np.all(ratio > 1.0 + MINIMAL)),
-            figure=number,
-        ),
-    )
-
-
-def _paths(walks: Walks, number: int, floor: str) -> Explained:
+def _paths(walks: Walks, number: int) -> Explained:
+    floor = FLOOR_OF[number]
     figure = Figure(figsize=(WIDE, 2.3), layout='constrained')
     ax = figure.subplots()
     drifts, shares = {}, {}
     for case, (words, colour, style) in CASES.items():
         trials = [walks[f'hexapod_{floor}_{case}', seed] for seed in SEEDS]
         for trial in trials:
-            ax.plot(
-                *(1e3 * trial.body[:, :2]).T, color=colour, ls=style, lw=1.2,
-                label=words if trial is trials[0] else None,
-            )  # fmt: skip
+            label = words if trial is trials[0] else None
+            ax.plot(*(1e3 * trial.body[:, :2]).T, color=colour, ls=style, lw=1.2, label=label)
             ax.plot(*(1e3 * trial.body[-1, :2]), 's', color=colour, ms=4.0)
         own = [trial.metrics for trial in trials if trial.metrics is not None]
         drifts[case] = np.array([1e3 * abs(each.lateral_drift_m) for each in own])
         shares[case] = np.array([abs(each.lateral_drift_m) / each.distance_m for each in own])
     ax.axhline(0.0, color=PALE, lw=0.8, zorder=0)
-    ax.set_xlabel('x / mm')
-    ax.set_ylabel('y / mm')
+    ax.set(xlabel='x / mm', ylabel='y / mm')
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -150.0), max(high, 150.0))
-    legend(
-        figure,
-        [
-            *ax.get_legend_handles_labels()[0],
-            Line2D([], [], color=BLACK, marker='s', ms=4.0, ls='', label='end'),
-        ],
-    )
-    return explained(
-        number,
-        figure,
-        _path_claims(number, drifts, shares),
-        alt=f'Paths of the body on the {floor} floor. Aside at the end: '
-        + '; '.join(f'{CASES[case][0]} {_few(each)} mm' for case, each in drifts.items()),
-        title=f'Figure {number}: path of the body on the {floor} floor',
-        caption=f'Fifteen gait cycles on {len(SEEDS)} floors, each with another seed. The scale '
-        'of y is larger than that of x.',
-    )
-
-
-def _path_claims(number: int, drifts: Slips, shares: Slips) -> tuple[Claim, ...]:
-    seeds = f'{len(SEEDS)} floors, L2'
+    end = Line2D([], [], color=BLACK, marker='s', ms=4.0, ls='', label='end')
+    legend(figure, [*ax.get_legend_handles_labels()[0], end])
     straight = max(shares['dry_flat'].max(), shares['wet_dome'].max())
-    return (
-        claim(
-            'wet flat feet leave',
-            f'At the end the body is {_few(drifts["wet_flat"])} mm aside; on dry ground at '
-            f'most {drifts["dry_flat"].max():.0f} mm ({seeds}).',
-            tuple(drifts['wet_flat'].tolist()),
-            bool(
-                shares['wet_flat'].min() > STRAIGHT
-                and drifts['wet_flat'].min() > drifts['dry_flat'].max()
-            ),
-            figure=number,
-        ),
-        claim(
-            'wet domes keep a',
-            f'At the end the body is {_few(drifts["wet_dome"])} mm aside, at most '
-            f'{100.0 * straight:.1f} % of its distance ({seeds}).',
-            tuple(drifts['wet_dome'].tolist()),
-            bool(straight <= STRAIGHT),
-            figure=number,
-        ),
+    dry, wet, dome = drifts['dry_flat'].max(), drifts['wet_flat'], drifts['wet_dome']
+    at: dict[str, Any] = {'figure': number, 'seeds': f'{len(SEEDS)} floors, L2'}
+    claims = (
+        claim('wet flat feet leave', wet, shares['wet_flat'].min() > STRAIGHT and wet.min() > dry,
+              wet=wet, dry=dry, **at),
+        claim('wet domes keep a', dome, straight <= STRAIGHT, aside=dome, straight=straight, **at),
+    )  # fmt: skip
+    asides = '; '.join(
+        worded('{0} {1:.0f} mm', CASES[case][0], each) for case, each in drifts.items()
     )
+    return explained(number, figure, claims, asides=asides, floor=floor)
 
 
 def _slip_a_cycle(trial: Trial) -> list[float]:
     """Return the mean slip path of each foot in a gait cycle, mm."""
     assert trial.metrics is not None
     return [1e3 * each / trial.metrics.cycles for each in trial.metrics.slip_path_m]
-
-
-def _few(values: np.ndarray, form: str = '.0f') -> str:
-    return ', '.join(f'{value:{form}}' for value in values)
-
-
-def _seconds(value: float | None) -> str:
-    return 'never' if value is None else f'{value:.1f} s'

@@ -11,6 +11,7 @@ import math
 import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -123,72 +124,20 @@ SHAPES = (
 )
 
 
-@dataclass(frozen=True)
-class Case:
-    """A case of a method: tension (N/m), ratio of tensions, height (m), force (N), and status.
+Row = SimpleNamespace
+"""Result of a method on a shape, ``kind`` is ``result``:
 
-    The true height and force are in ``exact_height`` and ``exact_force``. Without a result, height
-    and force are None, and the status is the reason.
-    """
+- ``shape``, ``family``, ``size``: shape of the pad, family of the method, and its resolution
+- ``ms_per_solve``: median time of one case, milliseconds
+- ``height_error``, ``force_error``: median relative errors; with ``worst_`` the largest
+- ``dry``, ``false``: cases in which liquid does not rise, and the method has no result, or has one
+- ``refused``: cases in which liquid rises, and the method has no result
+- ``cases``: tension (N/m), ratio of tensions, height (m), force (N), those that are exact, and
+  status; without a result, height and force are None, and the status is the reason
 
-    tension: float
-    ratio: float
-    height: float | None
-    force: float | None
-    exact_height: float
-    exact_force: float
-    status: str
-
-
-@dataclass(frozen=True)
-class Result:
-    """Result of a method on a shape.
-
-    Attributes
-    ----------
-    kind : str
-    shape, family, size : str
-        Shape of the pad, family of the method, and its resolution.
-    ms_per_solve : float
-        Median time of one case, milliseconds.
-    height_error, force_error : float
-        Median relative errors; those that begin with ``worst_`` are the largest.
-    dry : int
-        Number of cases in which liquid does not rise, and the method has no result.
-    refused : int
-        Number of cases in which liquid rises, and the method has no result.
-    false : int
-        Number of cases in which liquid does not rise, and the method has a result.
-    cases : list of Case
-    """
-
-    kind: str
-    shape: str
-    family: str
-    size: str
-    ms_per_solve: float
-    height_error: float
-    worst_height_error: float
-    force_error: float
-    worst_force_error: float
-    dry: int
-    refused: int
-    false: int
-    cases: list[Case]
-
-
-@dataclass(frozen=True)
-class Trap:
-    """An input that makes a method fail, with its result and the true one."""
-
-    kind: str
-    method: str
-    given: str
-    answer: str
-    true: str
-
-
-Row = Result | Trap
+Or an input that makes a method fail, ``kind`` is ``trap``: ``method``, ``given``, its ``answer``
+and the ``true`` one.
+"""
 
 
 def measure(progress: Progress) -> list[Row]:
@@ -209,7 +158,7 @@ def measure(progress: Progress) -> list[Row]:
 
 def figures(rows: list[Row], progress: Progress | None = None) -> dict[str, Figure]:
     """Return the picture, by name."""
-    return {'capillary': capillary_chart.draw([row for row in rows if isinstance(row, Result)])}
+    return {'capillary': capillary_chart.draw([row for row in rows if row.kind == 'result'])}
 
 
 # --- truth ---------------------------------------------------------------------------------------
@@ -312,7 +261,7 @@ def _read(shape: Shape, found: Any) -> tuple[Pair | None, str]:
     return (found.height, found.force), found.status
 
 
-def run(shape: Shape, progress: Progress) -> list[Result]:
+def run(shape: Shape, progress: Progress) -> list[Row]:
     """Measure every method on a shape; report progress, 0 to 1, to ``progress``."""
     cases = [(tension, ratio) for tension in TENSIONS for ratio in RATIOS]
     exact = []
@@ -358,8 +307,9 @@ def result(
     solve: Callable[[Liquid], Any],
     cases: Sequence[Pair],
     exact: Sequence[Pair],
-) -> Result:
-    times, answers = [], []
+) -> Row:
+    times: list[float] = []
+    answers: list[dict[str, Any]] = []
     for (tension, ratio), (height, force) in zip(cases, exact, strict=True):
         liquid = Liquid(tension, ratio * tension)
         begun = spent_time()
@@ -374,12 +324,15 @@ def result(
             if pair:
                 times.append(1e3 * took)
         given, lifted = pair or (None, None)
-        answers.append(Case(tension, ratio, given, lifted, height, force, status))
-    rising = [case for case in answers if case.exact_height > 0.0]
-    still = [case for case in answers if case.exact_height == 0.0]
+        answers.append({
+            'tension': tension, 'ratio': ratio, 'height': given, 'force': lifted,
+            'exact_height': height, 'exact_force': force, 'status': status,
+        })  # fmt: skip
+    rising = [case for case in answers if case['exact_height'] > 0.0]
+    still = [case for case in answers if case['exact_height'] == 0.0]
     good = errors(answers)
     heights, forces = [each[0] for each in good], [each[1] for each in good]
-    return Result(
+    return Row(
         kind='result',
         shape=shape.name,
         family=family,
@@ -389,31 +342,27 @@ def result(
         worst_height_error=max(heights, default=math.nan),
         force_error=statistics.median(forces) if good else math.nan,
         worst_force_error=max(forces, default=math.nan),
-        dry=sum(case.height is None for case in still),
+        dry=sum(case['height'] is None for case in still),
         refused=len(rising) - len(good),
-        false=sum(case.height is not None for case in still),
+        false=sum(case['height'] is not None for case in still),
         cases=answers,
     )
 
 
-def errors(cases: Sequence[Case]) -> list[Pair]:
+def errors(cases: Sequence[dict[str, Any]]) -> list[Pair]:
     """Return the relative errors of height and force where liquid rises and there is a result."""
     return [
-        (_off(case.height, case.exact_height), _off(case.force, case.exact_force))
+        (abs(case['height'] / case['exact_height'] - 1.0),
+         abs(case['force'] / case['exact_force'] - 1.0))
         for case in cases
-        if case.height is not None and case.exact_height > 0.0
-    ]
-
-
-def _off(found: float | None, exact: float) -> float:
-    assert found is not None
-    return abs(found / exact - 1.0)
+        if case['height'] is not None and case['exact_height'] > 0.0
+    ]  # fmt: skip
 
 
 # --- traps -----------------------------------------------------------------------------
 
 
-def traps() -> list[Trap]:
+def traps() -> list[Row]:
     """Return inputs that make methods fail, with the results of the methods and the true ones."""
     round_, narrow, upright = SHAPES
     meshes = {shape.name: shape.mesh(48, 72) for shape in SHAPES}
@@ -436,8 +385,8 @@ def traps() -> list[Trap]:
         height = truth(shape, liquid)[0]
         return f'{1e3 * height:.2f} mm' if height else 'no rise'
 
-    def trap(method: str, given: str, answer: str, true: str) -> Trap:
-        return Trap('trap', method, given, answer, true)
+    def trap(method: str, given: str, answer: str, true: str) -> Row:
+        return Row(kind='trap', method=method, given=given, answer=answer, true=true)
 
     rows = []
     for balance in BALANCES:
@@ -474,6 +423,5 @@ def traps() -> list[Trap]:
 
 def table(rows: Sequence[Row]) -> str:
     """Return the rows as text."""
-    kinds = (Result, Trap)
-    parts = ([vars(row) for row in rows if isinstance(row, kind)] for kind in kinds)
+    parts = ([vars(row) for row in rows if row.kind == kind] for kind in ('result', 'trap'))
     return '\n\n'.join(map(command.listed, parts))

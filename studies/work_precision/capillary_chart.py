@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -14,9 +14,6 @@ from matplotlib.lines import Line2D
 
 from ros_pad.reports.style import legend
 from studies.drawing import BLACK, BLUE, GREEN, PALE, PAPER_STYLE, PURPLE, VERMILION
-
-if TYPE_CHECKING:
-    from studies.work_precision.capillary import Result
 
 _LOWEST = 1e-5  # smaller errors are written as numbers at the lower edge
 _BESIDE: dict[str, Any] = {'textcoords': 'offset points', 'fontsize': 7.0}
@@ -30,7 +27,7 @@ LOOKS = {
 }
 
 
-def draw(results: Sequence[Result]) -> Figure:
+def draw(results: Sequence[Any]) -> Figure:
     """Return the picture: for each shape, errors over time, and heights over the tension."""
     shapes = list(dict.fromkeys(result.shape for result in results))
     with matplotlib.rc_context(PAPER_STYLE):
@@ -69,7 +66,7 @@ def draw(results: Sequence[Result]) -> Figure:
     return figure
 
 
-def _errors(panel: Axes, results: Sequence[Result], quantity: str) -> None:
+def _errors(panel: Axes, results: Sequence[Any], quantity: str) -> None:
     for family, (colour, mark, _) in LOOKS.items():
         part = [result for result in results if result.family == family]
         times = [result.ms_per_solve for result in part]
@@ -96,15 +93,19 @@ def _errors(panel: Axes, results: Sequence[Result], quantity: str) -> None:
     panel.grid(color=PALE, alpha=0.3, lw=0.5)
 
 
-def _spread(panel: Axes, results: Sequence[Result]) -> None:
+def _spread(panel: Axes, results: Sequence[Any]) -> None:
     panel.axhline(1.0, color=PALE, lw=0.7)
     for family in ('thesis', 'force', 'energy'):
         colour, mark, _ = LOOKS[family]
         result = [result for result in results if result.family == family][-1]
-        for tension in dict.fromkeys(case.tension for case in result.cases):
-            cases = [c for c in result.cases if c.tension == tension and c.exact_height > 0.0]
-            x = [case.ratio for case in cases]
-            y = [(case.height or math.nan) / case.exact_height for case in cases]
+        for tension in dict.fromkeys(case['tension'] for case in result.cases):
+            cases = [
+                case
+                for case in result.cases
+                if case['tension'] == tension and case['exact_height'] > 0.0
+            ]
+            x = [case['ratio'] for case in cases]
+            y = [(case['height'] or math.nan) / case['exact_height'] for case in cases]
             dashed = (0, (4, 2)) if tension < 0.01 else '-'
             panel.plot(x, y, color=colour, marker=mark, ms=3.5, lw=1.0, ls=dashed)
     panel.set(yscale='log', xlabel='tension of the solid / of the liquid', xlim=(0.25, 1.0))

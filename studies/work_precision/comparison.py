@@ -9,7 +9,8 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -81,45 +82,17 @@ class Method:
     ours: bool = False
 
 
-@dataclass(frozen=True)
-class Result:
-    """Result of a method on a problem.
+Result = SimpleNamespace
+"""Result of a method on a problem.
 
-    Attributes
-    ----------
-    problem, method : str
-    us_per_solve : float
-        Median time of one solution of an ordinary case, microseconds.
-    error : float
-        Largest relative error of the results that are no failures.
-    median_error : float
-        Median of the same errors.
-    failures : int
-        Number of cases without a result, with a warning, or with a wrong result.
-    wrong : int
-        Number of wrong results without a warning.
-    cases : int
-    versus : float
-        Time over the time of the baseline.
-    baseline : str
-        Name of the method that times are compared with.
-    examples : list
-        Up to five cases that failed: the inputs and the result.
-    ours : bool
-    """
-
-    problem: str
-    method: str
-    us_per_solve: float
-    error: float
-    median_error: float
-    failures: int
-    wrong: int
-    cases: int
-    versus: float
-    baseline: str
-    examples: list[dict[str, Any]]
-    ours: bool
+- ``problem``, ``method``, ``ours``
+- ``us_per_solve``: median time of one solution of an ordinary case, microseconds
+- ``error``, ``median_error``: largest and median relative error of results that are no failures
+- ``failures``: cases without a result, with a warning, or with a wrong result, of ``cases``
+- ``wrong``: wrong results without a warning
+- ``versus``: time over the time of the method named ``baseline``
+- ``examples``: up to five cases that failed: the inputs and the result
+"""
 
 
 def run(
@@ -136,9 +109,9 @@ def run(
         if progress is not None:
             progress(done + 1)
     base = next(result.us_per_solve for result in results if result.method == baseline)
-    return [
-        Result(**{**asdict(result), 'versus': result.us_per_solve / base}) for result in results
-    ]
+    for result in results:
+        result.versus = result.us_per_solve / base
+    return results
 
 
 def answer(method: Method, problem: Problem) -> Array:

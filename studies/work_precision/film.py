@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import matplotlib
@@ -282,8 +282,8 @@ def landings() -> list[dict[str, Any]]:
         found = []
         for seed in SEEDS:
             loop = ClosedLoop(scene, 'dome', seed, fidelity='L2')
-            feet = loop.robot.feet
-            force = np.array([[f.force[2] for f in feet] for _ in loops.samples(loop, scene)])
+            walked = loops.samples(loop, scene)
+            force = np.array([[f.force[2] for f in loop.robot.feet] for _ in walked])
             for leg in force.T:
                 found += rise_times(leg, 1.0 / RATE)
         half, most = np.quantile(found, (0.05, 0.5, 0.95), axis=0).T.tolist()
@@ -366,7 +366,7 @@ def main(words: Sequence[str]) -> int:
     options = parser.parse_args(words)
     results = compare()
     document = {
-        'rows': [asdict(result) for result in results],
+        'rows': [vars(result) for result in results],
         'soles': sensitivity(),
         'domes': domes(),
         'rises': rises(),

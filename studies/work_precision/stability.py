@@ -11,7 +11,6 @@ import dataclasses
 import math
 import random
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,11 +19,9 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
 from ros_pad.simulation.pneumatics import (
     ATMOSPHERE,
@@ -364,10 +361,7 @@ _VOLUME = _SCENE.foot.air_volume(0.0)
 _FILL_TIME = 0.5  # s: the pad is full long before
 _QUIET = 1.0  # Pa: larger distances from the set-point count as failures
 ISO, ISO_LINEAR = 'explicit Euler, ISO 6358', 'explicit Euler, ISO 6358 with linear range'
-CHANNEL, KEPT = 'PneumaticChannel', 'pad kept full, with error control'
-SOLVERS = ('RK45', 'LSODA', 'Radau', 'BDF')
-TIMES = (0.1, 0.2, 0.3)  # s
-MANY, MOST_CALLS = 1000, 120_000
+CHANNEL = 'PneumaticChannel'
 _REGULATOR = RegulatorModel(natural_frequency=1000.0, damping=1.0, dead_time=0.0, dead_band=0.0)
 _CAPACITY = REFERENCE_DENSITY * (_VOLUME + _LINE.volume) / REFERENCE_PRESSURE  # kg/Pa
 _SUPPLY = FILL + ATMOSPHERE
@@ -416,39 +410,6 @@ def filled_by_channel(dt: float) -> float:
     return max([abs(channel.step(FILL, dt) - FILL) for _ in range(round(_FILL_TIME / dt))][-10:])
 
 
-class _CountingHose(Hose):
-    """A hose that counts the calls of its conductance."""
-
-    calls = 0
-
-    def conductance(self, first: float, second: float) -> float:
-        type(self).calls += 1
-        return super().conductance(first, second)
-
-
-def channel_calls(duration: float) -> int:
-    """Return how often our channel calls the conductance of its hose in a time, s."""
-    _CountingHose.calls = 0
-    PneumaticChannel(_REGULATOR, _CountingHose(4e-3, 1.0), _VOLUME).step(FILL, duration)
-    return _CountingHose.calls
-
-
-def adaptive_calls(method: str, duration: float) -> int | None:
-    """Return how often solve_ivp, to 1e-6, calls the flow; None when it is stopped as too many."""
-    calls = 0
-
-    def rates(_: float, pressure: Array) -> list[float]:
-        nonlocal calls
-        calls += 1
-        if calls > MOST_CALLS:
-            raise TimeoutError
-        return [iso_flow(_SUPPLY, float(pressure[0])) / _CAPACITY]
-
-    with suppress(TimeoutError):
-        solve_ivp(rates, (0.0, duration), [ATMOSPHERE], method, rtol=1e-6, atol=0.1)
-    return calls if calls <= MOST_CALLS else None
-
-
 def filling() -> list[Outcome]:
     """Fill a pad to 75 kPa; chatter is the distance of the full pad from this pressure."""
     methods: dict[str, Callable[[float], float]] = {
@@ -465,14 +426,6 @@ def filling() -> list[Outcome]:
             outcomes.append(
                 Outcome('pad filled through a hose', name, name == CHANNEL, 'step, s', dt,
                         'pressure off the set-point, Pa', value, law, value > _QUIET)
-            )  # fmt: skip
-    for name in (*SOLVERS, CHANNEL):
-        label = name if name == CHANNEL else f'solve_ivp ({name})'
-        for time in TIMES:
-            calls = channel_calls(time) if name == CHANNEL else adaptive_calls(name, time)
-            outcomes.append(
-                Outcome(KEPT, label, name == CHANNEL, 'time simulated, s', time,
-                        'calls of the flow', calls, None, calls is None or calls > MANY)
             )  # fmt: skip
     return outcomes
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import matplotlib
@@ -254,59 +254,36 @@ def _without_measurement(walk: Recording, condition: Condition) -> dict[str, lis
 # --- tables --------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Row:
-    """Scores of a filter under a condition, of a class of friction, early or late."""
-
-    condition: str
-    filter: str
-    phase: str
-    ground: str
-    walks: int
-    samples: int
-    stances: int
-    coverage: float
-    coverages: list[float]
-    stance_coverage: float
-    right_coverage: float | None
-    below: float
-    belows: list[float]
-    width: float
-    crps: float
-    wrong_labels: float | None
+Row = dict[str, Any]
+"""Scores of a filter under a condition, of a class of friction, early or late."""
 
 
-@dataclass
-class _Columns:
-    """The samples of a walk as arrays."""
+def _columns(samples: Sequence[Sample]) -> dict[str, np.ndarray]:
+    """Return the samples of a walk as arrays."""
+    rows = np.array([astuple(each) for each in samples], dtype=float)
+    return dict(zip(Sample.__dataclass_fields__, rows.T, strict=True)) if samples else {}
 
-    samples: list[Sample]
-    table: dict[str, np.ndarray] = field(init=False)
 
-    def __post_init__(self) -> None:
-        rows = [tuple(vars(each).values()) for each in self.samples]
-        names = Sample.__dataclass_fields__
-        self.table = dict(zip(names, np.array(rows, dtype=float).T, strict=True)) if rows else {}
-
-    def of(self, ground: int, start: float, end: float) -> dict[str, np.ndarray]:
-        """Return the samples of a class between two times, s."""
-        if not self.table:
-            return {}
-        time = self.table['time']
-        mine = (self.table['ground'] == ground) | (CLASSES[ground] == 'all')
-        use = mine & (time >= start) & (time < end)
-        return {name: values[use] for name, values in self.table.items()} if use.any() else {}
+def _chosen(
+    table: dict[str, np.ndarray], ground: int, start: float, end: float
+) -> dict[str, np.ndarray]:
+    """Return the samples of a class between two times, s."""
+    if not table:
+        return {}
+    mine = (table['ground'] == ground) | (CLASSES[ground] == 'all')
+    use = mine & (table['time'] >= start) & (table['time'] < end)
+    return {name: values[use] for name, values in table.items()} if use.any() else {}
 
 
 def rows_of(condition: Condition, walks: Sequence[dict[str, list[Sample]]]) -> list[Row]:
     """Return the rows of the walks under a condition."""
     rows = []
     for name in FILTERS:
-        columns = [_Columns(walk[name]) for walk in walks]
+        columns = [_columns(walk[name]) for walk in walks]
         phases = [('early', 0.0, EARLY), ('late', LATE, math.inf)]
         for phase, start, end in [('whole', 0.0, math.inf)] if condition.name == DRAWN else phases:
             for ground, ground_name in enumerate(CLASSES):
-                parts = [part for each in columns if (part := each.of(ground, start, end))]
+                parts = [part for each in columns if (part := _chosen(each, ground, start, end))]
                 if parts:
                     rows.append(_row(condition.name, name, phase, ground_name, parts))
     return rows
@@ -338,18 +315,22 @@ def _row(
             means = np.quantile(again[:, 0] / again[:, 1], [0.025, 0.975])
         return [round(float(means.min()), 3), round(float(means.max()), 3)]
 
-    return Row(
-        condition, name, phase, ground, len(parts), len(joined['time']), len(by_stance),
-        mean('covered'), ends('covered'), round(float(by_stance.mean()), 4),
-        round(float(joined['covered'][right].mean()), 4) if measured and right.any() else None,
-        mean('below'), ends('below'), mean('width'), mean('crps'),
-        round(float(np.concatenate(labels).mean()), 4) if measured else None,
-    )  # fmt: skip
+    return {
+        'condition': condition, 'filter': name, 'phase': phase, 'ground': ground,
+        'walks': len(parts), 'samples': len(joined['time']), 'stances': len(by_stance),
+        'coverage': mean('covered'), 'coverages': ends('covered'),
+        'stance_coverage': round(float(by_stance.mean()), 4),
+        'right_coverage': round(float(joined['covered'][right].mean()), 4)
+        if measured and right.any() else None,
+        'below': mean('below'), 'belows': ends('below'), 'width': mean('width'),
+        'crps': mean('crps'),
+        'wrong_labels': round(float(np.concatenate(labels).mean()), 4) if measured else None,
+    }  # fmt: skip
 
 
 def table(rows: Sequence[Row]) -> str:
     """Return all but the first half minute as text."""
-    return command.listed([asdict(row) for row in rows if row.phase != 'early'])
+    return command.listed([row for row in rows if row['phase'] != 'early'])
 
 
 _LOOKS = dict(
@@ -433,7 +414,7 @@ def main(words: Sequence[str]) -> int:
         'duration_s': options.duration,
         'seeds': sorted({case[2] for case in cases if case[0].name != DRAWN}),
         'seeds_drawn': list(draws),
-        'rows': [asdict(row) for row in rows],
+        'rows': rows,
     }
     written = command.write(options.out, NAME, document, {NAME: draw(document)})
     command.show(options, written, table(rows))

@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,62 +20,24 @@ FAILED = 0.1  # relative error of distance or slip above which a walk has failed
 LEAST = 0.01  # share of the stride: errors of shorter distances are relative to this share
 
 
-@dataclass(frozen=True)
-class WalkResult:
-    """Results of a walker.
+WalkResult = SimpleNamespace
+"""Results of a walker.
 
-    Attributes
-    ----------
-    robot, method, family : str
-    step_s : float or None
-        Time step, s; None where the method chooses its own.
-    ms_per_second : float
-        Median computing time of a simulated second, ms.
-    us_per_step : float
-        Median computing time of a step, us; of a step of MuJoCo on L2.
-    versus : float
-        Time of a simulated second over that of the baseline, median over walks of the ratio.
-    baseline, top : str
-        Names of the walkers that times (``baseline``) and errors (``top``) are relative to; errors
-        may be relative to the mean of two.
-    band : dict of float
-        Half of the difference of these two, median over walks, in the units of ``errors``.
-    errors, worst : dict of float
-        Median and largest error of ``distance`` and ``slip`` (relative), ``lateral`` (m a cycle)
-        and ``yaw`` (rad a cycle), of walks without a verdict; NaN where there are none.
-    failures : int
-        Number of walks whose distance is off by more than 10 %, or that have no valid result.
-    slip_failures : int
-        The same for the slip path.
-    refused : int
-        Number of walks without a valid result: they ended with a verdict or an error.
-    cases, cycles : int
-        Number of walks, and of gait cycles of each.
-    walks : list of dict
-        Each walk, with its results and the relative error of its distance.
-    ours : bool
-    """
-
-    robot: str
-    method: str
-    family: str
-    step_s: float | None
-    ms_per_second: float
-    us_per_step: float
-    versus: float
-    baseline: str
-    top: str
-    band: dict[str, float]
-    errors: dict[str, float]
-    worst: dict[str, float]
-    failures: int
-    slip_failures: int
-    refused: int
-    cases: int
-    cycles: int
-    walks: list[dict[str, Any]]
-    ours: bool
-
+- ``robot``, ``method``, ``family``; ``step_s``: time step, s, None if the method chooses it
+- ``ms_per_second``, ``us_per_step``: median computing time of a simulated second, ms, and of a
+  step, us; on L2 of a step of MuJoCo
+- ``versus``: time of a simulated second over that of the baseline, median over walks of the ratio
+- ``baseline``, ``top``: names of the walkers that times and errors are relative to; errors may be
+  relative to the mean of two
+- ``band``: half of the difference of these two, median over walks, in the units of ``errors``
+- ``errors``, ``worst``: median and largest error of ``distance`` and ``slip`` (relative),
+  ``lateral`` (m a cycle) and ``yaw`` (rad a cycle), of walks without a verdict; else NaN
+- ``failures``, ``slip_failures``: walks whose distance, or slip path, is off by more than 10 %, or
+  that have no valid result; ``refused``: those that ended with a verdict or an error
+- ``cases``, ``cycles``: number of walks, and of gait cycles of each
+- ``walks``: each walk, with its results and the relative error of its distance
+- ``ours``: whether the method belongs to ros_pad
+"""
 
 RELATIVE = ('distance', 'slip')
 MEASURES = {HEXAPOD: (*RELATIVE, 'lateral', 'yaw'), TOWING: RELATIVE, RAIL: RELATIVE}

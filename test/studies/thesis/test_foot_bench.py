@@ -92,8 +92,7 @@ def test_draws_are_within_the_factor_and_fixed_by_the_seed():
     drawn = foot_bench.draws(SCENE.foot, SCENE.setup)
     assert len(drawn) == 200
     assert drawn == foot_bench.draws(SCENE.foot, SCENE.setup)
-    other = dataclasses.replace(SCENE.setup, seed=2)
-    again = foot_bench.draws(SCENE.foot, other)
+    again = foot_bench.draws(SCENE.foot, SCENE.changed(seed=2).setup)
     assert [foot.friction for foot, _, _ in drawn] != [foot.friction for foot, _, _ in again]
     friction = np.array([foot.friction for foot, _, _ in drawn]) / MU
     depth = np.array([setup.film_thickness for _, setup, _ in drawn]) / DEPTH
@@ -130,8 +129,7 @@ def test_verdicts():
 def test_a_film_that_rubs_enough_settles_the_sign():
     """Where boundary friction is above all dry friction, the liquid adds force in every draw."""
     foot = dataclasses.replace(SCENE.foot, boundary_friction=3.0, friction=0.05)
-    few = dataclasses.replace(SCENE.setup, samples=50)
-    trial = bench.run(dataclasses.replace(SCENE, foot=foot, setup=few))
+    trial = bench.run(dataclasses.replace(SCENE, foot=foot).changed(samples=50))
     shares = trial.pick('share of draws above 0', condition='flat, smooth')
     assert [row.modelled for row in shares] == [1.0] * 4
     assert trial.claims[1].holds is True
@@ -145,6 +143,6 @@ def test_liquid_that_reaches_the_base_of_the_pads_has_no_estimate_by_layers():
         assert all(math.isfinite(row.modelled) for row in rows)
         return {row.model for row in rows if 'water' in row.model and 'gaps' not in row.model}
 
-    heavy = dataclasses.replace(SCENE.setup, lowest_load=2.9, samples=20)
-    lost = layered(TRIAL) - layered(bench.run(dataclasses.replace(SCENE, setup=heavy)))
+    heavy = SCENE.changed(lowest_load=2.9, samples=20)
+    lost = layered(TRIAL) - layered(bench.run(heavy))
     assert lost == {'4.18, energy, water', '4.18, thesis, water'}

@@ -41,13 +41,13 @@ def test_rows_count_time_and_stances():
     early = [Sample(10.0, 3, 1, 0.9, True, False, 0.4, 0.02)]
     walk = {name: [] for name in priors.FILTERS} | {priors.LEARNS: early + covered + missed}
     first, _, second, both = priors.rows_of(Condition('any'), [walk])
-    assert (first.phase, first.ground, first.samples) == ('early', 'wet', 1)
-    assert (second.phase, second.ground, second.stances) == ('late', 'dry', 2)
-    assert second.coverage == 0.9 and second.stance_coverage == 0.5
-    assert second.right_coverage == 1.0
-    assert second.below == 0.1 and second.wrong_labels == 0.5
-    assert second.crps == pytest.approx((9 * 0.01 + 0.05) / 10, abs=1e-4)
-    assert (both.ground, both.coverage) == ('all', 0.9)
+    assert (first['phase'], first['ground'], first['samples']) == ('early', 'wet', 1)
+    assert (second['phase'], second['ground'], second['stances']) == ('late', 'dry', 2)
+    assert second['coverage'] == 0.9 and second['stance_coverage'] == 0.5
+    assert second['right_coverage'] == 1.0
+    assert second['below'] == 0.1 and second['wrong_labels'] == 0.5
+    assert second['crps'] == pytest.approx((9 * 0.01 + 0.05) / 10, abs=1e-4)
+    assert (both['ground'], both['coverage']) == ('all', 0.9)
 
 
 def test_the_foot_of_a_walk_has_the_friction_of_its_condition():

@@ -57,23 +57,16 @@ def test_where_iterations_fail_when_all_feet_slip():
 
 
 def test_printed_flow_law_has_no_stable_step_and_ours_no_chatter(monkeypatch):
-    monkeypatch.setattr(stability, 'TIMES', (0.1,))
-    monkeypatch.setattr(stability, 'SOLVERS', ('RK45', 'BDF'))
     # The step limit is 0.438 ms; with laminar flow, as in this hose, it is 0.479 ms.
     monkeypatch.setattr(stability, 'FILL_STEPS', (1e-4, 4.3e-4, 4.6e-4, 5e-3))
-    calls = {}
     for row in stability.filling():
-        if row.case == stability.KEPT:
-            calls[row.method] = row.value
-        elif row.method == stability.ISO:
+        if row.method == stability.ISO:
             assert row.value > 0.05
             assert row.law is None or row.value == pytest.approx(row.law, rel=0.01)
         elif row.method == stability.ISO_LINEAR:
             assert row.fails == (row.at > 4.38e-4)
         else:
             assert row.value < 0.1
-    assert calls['solve_ivp (RK45)'] > stability.MANY
-    assert max(calls['solve_ivp (BDF)'], calls[stability.CHANNEL]) < stability.MANY
 
 
 @pytest.mark.parametrize('ratio', [1.03, 1.3])
