@@ -67,7 +67,7 @@ class PadNode(Node):
     def __init__(self, name: str, parameters: Sequence[Parameter], **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self.prepare()
-        self.values = declare(self, parameters, self.apply, self.permit)
+        self.values = declare(self, parameters, self.apply)
         handle = self.get_clock().handle
         self.now_ns: Callable[[], int] = lambda: int(handle.get_now().nanoseconds)
         self.simulated: bool = self.get_parameter('use_sim_time').value
@@ -83,9 +83,6 @@ class PadNode(Node):
 
     def apply(self, values: Mapping[str, Any]) -> None:
         """Live by changed parameters; raise `PadError` if they are not allowed together."""
-
-    def permit(self, names: Sequence[str]) -> None:
-        """Raise `PadError` if parameters of these names must not change now."""
 
     # --- messages ------------------------------------------------------------------------------
 

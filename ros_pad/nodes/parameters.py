@@ -89,7 +89,6 @@ def declare(
     node: Node,
     table: Sequence[Parameter],
     apply: Callable[[Mapping[str, Any]], None],
-    permit: Callable[[Sequence[str]], None] = lambda names: None,
 ) -> dict[str, Any]:
     """Declare a table of parameters and return their values by name.
 
@@ -107,9 +106,6 @@ def declare(
     apply : callable
         Called with all values when some have changed; raises `PadError`, and changes nothing, if
         they are not allowed together.
-    permit : callable
-        Called before that with the names of all parameters that change, also of those that are not
-        in the table; raises `PadError` if they must not change now.
 
     Raises
     ------
@@ -142,7 +138,6 @@ def declare(
             if any(each.name == 'use_sim_time' and each.value != simulated for each in changes):
                 # A node that waits for a missing /clock would not vent.
                 raise ConfigError('parameter use_sim_time is read only at the start of the node')
-            permit([each.name for each in changes])
             changed = {
                 each.name: _checked(live[each.name], each.value)[1]
                 for each in changes

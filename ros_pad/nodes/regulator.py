@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
 from ros_pad.bags import topics
@@ -104,6 +106,7 @@ class RegulatorNode(PadNode, LifecycleNode):
         self._send = self.record_output(topics.PRESSURE, legs)
         self.receive_record(topics.COMMAND, legs, self._on_command)
         self.create_service(Trigger, '~/vent', self._on_vent)
+        self.add_on_set_parameters_callback(self._check_options)
         self.on_tick(self._tick, min(LONGEST_TICK, 0.5 / values['publish_rate']), all_steps=True)
         self._starting: bool = values['autostart']
         if self._starting:
@@ -127,10 +130,11 @@ class RegulatorNode(PadNode, LifecycleNode):
                 f' not allowed: the ceiling of foot {foot.source} is {foot.ceiling:g} Pa'
             )
 
-    def permit(self, names: Sequence[str]) -> None:
+    def _check_options(self, changes: list[RosParameter]) -> SetParametersResult:
         """Refuse changes of backend options while devices are open; *configure* reads them."""
-        if self.supervision.channels and any(BACKEND_OPTIONS in name for name in names):
-            raise ConfigError('the devices are open: clean up the node first')
+        if self.supervision.channels and any(BACKEND_OPTIONS in each.name for each in changes):
+            return SetParametersResult(reason='the devices are open: clean up the node first')
+        return SetParametersResult(successful=True)
 
     def apply(self, values: Mapping[str, Any]) -> None:
         """Supervise with changed settings."""
