@@ -67,7 +67,7 @@ class PadNode(Node):
     def __init__(self, name: str, parameters: Sequence[Parameter], **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self.prepare()
-        self.values = declare(self, parameters, self.apply)
+        self.values = declare(self, parameters, self.permit, self.apply)
         handle = self.get_clock().handle
         self.now_ns: Callable[[], int] = lambda: int(handle.get_now().nanoseconds)
         self.simulated: bool = self.get_parameter('use_sim_time').value
@@ -81,8 +81,11 @@ class PadNode(Node):
     def prepare(self) -> None:
         """Change what is given for the parameters, before they are declared."""
 
+    def permit(self, values: Mapping[str, Any]) -> None:
+        """Raise `PadError` if these values are not allowed together; change nothing."""
+
     def apply(self, values: Mapping[str, Any]) -> None:
-        """Live by changed parameters; raise `PadError` if they are not allowed together."""
+        """Live by changed parameters, which nobody has refused."""
 
     # --- messages ------------------------------------------------------------------------------
 

@@ -106,6 +106,10 @@ class ControllerNode(PadNode):
             }
         return policy_named(name, self._is_wet, settings)
 
+    def permit(self, values: Mapping[str, Any]) -> None:
+        """Raise `PadError` if no policy has these parameters."""
+        self._policy(values)
+
     def apply(self, values: Mapping[str, Any]) -> None:
         """Decide with changed parameters from the next lift-off on."""
         self.controller.policy = self._policy(values)

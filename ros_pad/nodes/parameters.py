@@ -88,14 +88,15 @@ AMBIENT_PRESSURE = Parameter(**vars(label.AMBIENT_PRESSURE))
 def declare(
     node: Node,
     table: Sequence[Parameter],
+    permit: Callable[[Mapping[str, Any]], object],
     apply: Callable[[Mapping[str, Any]], None],
 ) -> dict[str, Any]:
     """Declare a table of parameters and return their values by name.
 
     A name that looks misspelt is refused, other unknown names are warned of.
 
-    Later changes of live parameters are checked, and update the returned mapping when they are
-    accepted. Changes of the other parameters and of ``use_sim_time`` are refused.
+    Later changes of live parameters are checked, and update the returned mapping when nobody has
+    refused them. Changes of the other parameters and of ``use_sim_time`` are refused.
 
     Parameters
     ----------
@@ -103,9 +104,11 @@ def declare(
         Node to declare them on.
     table : sequence of Parameter
         Parameters of the node.
+    permit : callable
+        Called with all values before some change; raises `PadError` if they are not allowed
+        together, and changes nothing, because another callback may still refuse the change.
     apply : callable
-        Called with all values when some have changed; raises `PadError`, and changes nothing, if
-        they are not allowed together.
+        Called with all values after some have changed.
 
     Raises
     ------
@@ -138,19 +141,26 @@ def declare(
             if any(each.name == 'use_sim_time' and each.value != simulated for each in changes):
                 # A node that waits for a missing /clock would not vent.
                 raise ConfigError('parameter use_sim_time is read only at the start of the node')
-            changed = {
-                each.name: _checked(live[each.name], each.value)[1]
-                for each in changes
-                if each.name in live
-            }
-            if changed:
-                apply(values | changed)
+            if changed := read(changes):
+                permit(values | changed)
         except PadError as error:
             return SetParametersResult(reason=f'node {node.get_name()}: {error}')
-        values.update(changed)
         return SetParametersResult(successful=True)
 
+    def read(changes: list[RosParameter]) -> dict[str, Any]:
+        return {
+            each.name: _checked(live[each.name], each.value)[1]
+            for each in changes
+            if each.name in live
+        }
+
+    def follow(changes: list[RosParameter]) -> None:
+        if changed := read(changes):
+            values.update(changed)
+            apply(values)
+
     node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(follow)
     return values
 
 

@@ -189,7 +189,7 @@ def test_bad_messages_are_refused_with_the_reason(robot, spoil, reason, capfd):
 
 
 @pytest.mark.parametrize('missing', ['force', 'imu', 'joints'])
-def test_a_reading_that_is_missing_leaves_a_gap_and_no_more(robot, missing):
+def test_a_reading_that_is_missing_leaves_a_gap_and_no_more(robot, missing, capfd):
     """NaN is none: each moment has its record all the same, so that nobody waits for it."""
     robot.start()
     robot.stand(60)
@@ -202,6 +202,7 @@ def test_a_reading_that_is_missing_leaves_a_gap_and_no_more(robot, missing):
     assert stamps.tolist() == list(range(4, 201, 4))
     assert np.isfinite(rows['force'][-20:]).all()
     assert robot.doubt() == ''
+    assert 'reading ignored' not in capfd.readouterr().err
 
 
 def test_neither_forces_nor_efforts(robot):

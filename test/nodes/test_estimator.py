@@ -184,6 +184,7 @@ def test_feet_without_samples_are_errors_within_a_second(robot):
     robot.bench.tick(1.0)
     level, message = robot.health()
     assert level == ERROR and message.startswith('no wrench: for ')
+    assert robot.doubts()[-1] == 'no wrench'  # the controller knows, too
     robot.now_ns = robot.bench.now_ns
     robot.stance(0.1, 0.0, 0.2)
     assert robot.health()[0] == OK

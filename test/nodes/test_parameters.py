@@ -6,7 +6,7 @@ import re
 
 import pytest
 import yaml
-from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter as Override
 
@@ -79,7 +79,7 @@ def declared(context):
         overrides = [Override(name, value=value) for name, value in given.items()]
         node = Node('probe', context=context, parameter_overrides=overrides)
         nodes.append(node)
-        return node, declare(node, table, lambda values: told.append(dict(values)))
+        return node, declare(node, table, dict, lambda values: told.append(dict(values)))
 
     declared.told = told
     yield declared
@@ -111,6 +111,22 @@ def test_live_parameters_change_later_and_others_do_not(declared):
     assert values == {'gain': 3.0, 'mode': 'fast', 'rate': 50.0} == declared.told[-1]
     assert node.get_parameter('gain').value == 3.0
     assert not node.set_parameters([Override('rate', value=20.0)])[0].successful
+
+
+def test_what_another_callback_refuses_takes_no_effect(context):
+    def refuse(changes):
+        return SetParametersResult(successful=all(each.value != 'fast' for each in changes))
+
+    node, told = Node('probe', context=context), []
+    try:
+        node.add_on_set_parameters_callback(refuse)  # rclpy calls the first one last
+        values = declare(node, (GAIN, MODE), dict, told.append)
+        before = dict(values)
+        changes = [Override('gain', value=3.0), Override('mode', value='fast')]
+        assert not node.set_parameters_atomically(changes).successful
+        assert (values, told) == (before, [])
+    finally:
+        node.destroy_node()
 
 
 @pytest.mark.parametrize(

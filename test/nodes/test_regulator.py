@@ -377,8 +377,12 @@ def test_a_port_can_be_corrected_and_tried_again(robot, devices, capfd):
         'usb',
         'usb',
     ]
-    refused = robot.bench.set('backend_options.port', 'other')
+    settings = robot.channel(1).settings
+    changes = {'command_timeout': 0.1, 'backend_options.port': 'other'}
+    refused = node.set_parameters_atomically(overrides(changes))
     assert not refused.successful
+    assert robot.channel(1).settings == settings
+    assert node.values['command_timeout'] != 0.1
     assert 'clean up the node first' in refused.reason
 
 
