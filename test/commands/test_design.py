@@ -141,6 +141,7 @@ class TestMaterials:
         assert [each['carried'] for each in found] == ['yes', 'yes', 'in doubt', 'yes']
         assert (values['criterion'], values['ceiling']) == ('flattening', 60e3)
         assert '3 of 4 candidates carry 2 N at up to 60000 Pa' in values['says'][0]
+        assert '; 1 more if' in values['says'][0]
 
     def test_the_table_and_the_picture(self, tmp_path, capsys):
         path = tmp_path / 'materials.png'
