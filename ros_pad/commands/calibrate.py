@@ -16,7 +16,7 @@ from ros_pad.configuration import choice, refuse
 from ros_pad.contact import Foot, Material, Pad
 from ros_pad.contact.calibrate import Calibration, calibrate, foot_file
 from ros_pad.contact.measurements import Measurements
-from ros_pad.errors import ConfigError, InvalidInput, PadError
+from ros_pad.errors import ConfigError, InvalidInput
 
 
 def add(commands: Commands) -> None:
@@ -73,10 +73,7 @@ def run(options: argparse.Namespace) -> int:
     except ConfigError as error:
         complain(error, 0)
         picture = None
-        try:
-            path.write_text(foot_file(found), encoding='utf-8')
-        except OSError as problem:
-            raise PadError(f'{path}: cannot be written: {problem.strerror}') from problem
+        path.write_text(foot_file(found), encoding='utf-8')
     if options.json:
         print(json.dumps(_values(found, path, picture)))
     else:

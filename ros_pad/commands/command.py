@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import pathlib
 import re
@@ -17,6 +18,12 @@ from ros_pad.errors import BagError, ConfigError, InvalidInput, PadError, reason
 from ros_pad.signals import INTERRUPTED
 
 WIDEST = 98  # largest width of tables in columns, also on a wider terminal
+
+UNITS = {
+    **{'_n_per_m': 'N/m', '_kg_per_m3': 'kg/m³', '_m2': 'm²', '_m3': 'm³', '_m': 'm'},
+    **{'_pa': 'Pa', '_n': 'N', '_deg': '°', '_s': 's'},
+}
+"""Units of values, by the end of their names in JSON; longer ends first."""
 
 FILE: dict[str, Any] = {'type': pathlib.Path, 'metavar': 'FILE'}
 FOLDER: dict[str, Any] = {'type': pathlib.Path, 'metavar': 'DIR'}
@@ -110,3 +117,14 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: int =
             for column, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         print('  '.join(cells).rstrip())
+
+
+def named(name: str, value: Any) -> tuple[str, str]:
+    """Return a name of JSON as words, and its value as text with the unit that ends the name."""
+    unit = next((each for each in UNITS if name.endswith(each)), '')
+    words = name.removesuffix(unit).replace('_', ' ')
+    if isinstance(value, list):
+        return words, ' to '.join(f'{100.0 * share:+.2g} %' for share in value)
+    if not isinstance(value, float):
+        return words, str(value)
+    return words, 'no answer' if math.isnan(value) else f'{value:.6g} {UNITS.get(unit, "")}'

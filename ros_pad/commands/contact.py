@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ros_pad import contact
-from ros_pad.commands.command import Commands, add_command, complain
+from ros_pad.commands.command import Commands, add_command, complain, named
 from ros_pad.configuration import number
 from ros_pad.contact.dome import MODELS
 from ros_pad.contact.limits import criteria, largest_pressure
@@ -21,7 +21,6 @@ _TITLES = {
     'meniscus': 'ring of liquid',
     'force_limit_n': 'force limit, by criterion',
 }
-_UNITS = {'m': 'm', 'm3': 'm³', 'n': 'N'}
 _DESCRIPTION = """\
 Shape of a pad at a pressure, free or pressed, and its force limits.
 
@@ -145,12 +144,10 @@ def _show(values: dict[str, Any], ends: dict[str, float]) -> None:
             continue
         print(title)
         for key, value in values[part].items():
-            words, _, unit = key.rpartition('_') if part != 'force_limit_n' else (key, '', 'n')
+            name = key if part != 'force_limit_n' else f'{key}_n'
+            words, text = named(name, value)
             if value is None:
-                print(f'  {key:18} not known above {ends[key]:.6g} Pa')
-            elif isinstance(value, str):
-                print(f'  {key:18} {value}')
-            else:
-                print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
+                text = f'not known above {ends[key]:.6g} Pa'
+            print(f'  {words:18} {text}')
         if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > values['radius_m']:
             print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')

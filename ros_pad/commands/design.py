@@ -135,14 +135,18 @@ def _of_materials(options: argparse.Namespace, foot: Foot | None, area: float) -
     """Design pads of materials and thicknesses; return what JSON has."""
     if options.stiffness is not None:
         raise InvalidInput('--stiffness is not allowed with a material, which has its own')
-    built, radius = foot, options.radius
+    radius = options.radius
     if radius is None:
         radius = LARGE_PAD.radius if foot is None else foot.pad.radius
-    if foot is not None and (radius, area) != (foot.pad.radius, foot.sole_area):
-        built = None
-    own, limit, measured = None, MATERIAL_CRITERION, None
-    if foot is not None and options.material is None:
-        own = foot
+    built = foot is not None and (radius, area) == (foot.pad.radius, foot.sole_area)
+    own = foot if options.material is None else None  # the foot whose material is asked for
+    limit, measured = MATERIAL_CRITERION, None
+    if own is None or own.pad.material is None:
+        names = options.material
+        names = configuration.names('materials') if names == ['all'] else names
+        materials, sheets = [Material.load(name) for name in names], [radius * s for s in SHEETS]
+    else:
+        materials, sheets = [own.pad.material], [own.pad.thickness]
         # A limit that was measured holds for its own pad alone.
         if (radius, options.thickness) == (own.pad.radius, None):
             measured = own.pad.measured_limit
@@ -153,19 +157,13 @@ def _of_materials(options: argparse.Namespace, foot: Foot | None, area: float) -
         'margin': options.margin,
         'criterion': options.criterion or limit,
     }
-    if own is None or own.pad.material is None:
-        names = options.material
-        names = configuration.names('materials') if names == ['all'] else names
-        materials, sheets = [Material.load(name) for name in names], [radius * s for s in SHEETS]
-    else:
-        materials, sheets = [own.pad.material], [own.pad.thickness]
     found = candidates(
         options.load,
         area,
         materials,
         options.thickness or sheets,
         radius,
-        pads=None if built is None else built.pads,
+        pads=foot.pads if built and foot else None,
         measured_limit=measured,
         **rules,
     )
@@ -173,14 +171,15 @@ def _of_materials(options: argparse.Namespace, foot: Foot | None, area: float) -
         from ros_pad.reports.design import draw_candidates
 
         draw_candidates(options.figure, found, rules['ceiling'])
+    rows = [candidate_values(each) for each in found]
     if not options.json:
-        _print_candidates(found)
-    counts = {word: sum(each.carried == word for each in found) for word in ('yes', 'in doubt')}
+        print(f'{found[0].pads} pads of radius {radius:g} m\n')
+        _print_rows(_OF_CANDIDATES, [row | {'ballooning_margin': _margin(row)} for row in rows])
+    yes, doubt = (sum(each.carried == word for each in found) for word in ('yes', 'in doubt'))
     says = [
-        f'{counts["yes"]} of {len(found)} candidates carry {options.load:g} N at up to'
+        f'{yes} of {len(found)} candidates carry {options.load:g} N at up to'
         f' {rules["ceiling"]:g} Pa, with a margin of {rules["margin"]:g} by the criterion'
-        f' {rules["criterion"]}; {counts["in doubt"]} more if their material is as favourable as'
-        ' it may be.',
+        f' {rules["criterion"]}; {doubt} more if their material is as favourable as it may be.',
         'In brackets: from the lowest to the highest factor on the stresses that the doubts about'
         ' a material leave open (see its file). pad calibrate narrows it to your pads.',
     ]
@@ -189,8 +188,7 @@ def _of_materials(options: argparse.Namespace, foot: Foot | None, area: float) -
             'Flattening is the end of the model: the pad of the thesis carried 0.33, 0.57 and 0.67'
             ' of it at 65, 75 and 85 kPa.'
         )
-    sole = {'load_n': options.load, 'area_m2': area}
-    return sole | rules | {'candidates': list(map(candidate_values, found)), 'says': says}
+    return {'load_n': options.load, 'area_m2': area} | rules | {'candidates': rows, 'says': says}
 
 
 def candidate_values(each: Candidate) -> dict[str, Any]:
@@ -262,67 +260,61 @@ def advice(each: Design) -> Iterator[str]:
         )
 
 
+# Heads of the printed tables, by the names of values in JSON.
+_OF_DESIGNS = {
+    'pads': 'pads',
+    'pitch_m': 'pitch, m',
+    'load_per_pad_n': 'load per pad, N',
+    'pressure_pa': 'pressure needed, Pa',
+    'ceiling_pa': 'ceiling, Pa',
+    'reachable_load_n': 'reachable load, N',
+    'dome_width_m': 'width of the domes, m',
+    'touching': 'domes touch',
+    'rise_height_m': 'height of rise, m',
+    'carried': 'load carried',
+}
+_OF_RADII = {'radius_m': 'radius, m', 'pads': 'pads', 'pressure_pa': 'Pa'}
+_OF_RADII |= {'reachable_load_n': 'reach, N', 'rise_height_m': 'rise, m'}
+_OF_CANDIDATES = {
+    'material': 'material',
+    'thickness_m': 'sheet, m',
+    'pressure_pa': 'pressure, Pa',
+    'height_m': 'height, m',
+    'reachable_load_n': 'load, N',
+    'largest_pressure_pa': 'largest, Pa',
+    'ballooning_margin': 'over pressure',
+    'carried': 'carried',
+}
+
+
 def _print(designs: dict[str, Design], rows: Sequence[Design]) -> None:
     first = next(iter(designs.values()))
     print(
         f'{first.load:g} N on a sole of {first.area:.4g} m², pads of radius {first.pad.radius:g} '
         f'm and {first.pad.stiffness:g} N/m, limit {first.criterion}, margin {first.margin:g}\n'
     )
-    table = {name: values(each) for name, each in designs.items()}
-    texts = {
-        'pads': 'pads',
-        'pitch_m': 'pitch, m',
-        'load_per_pad_n': 'load per pad, N',
-        'pressure_pa': 'pressure needed, Pa',
-        'ceiling_pa': 'ceiling, Pa',
-        'reachable_load_n': 'reachable load, N',
-        'dome_width_m': 'width of the domes, m',
-        'touching': 'domes touch',
-        'rise_height_m': 'height of rise, m',
-        'carried': 'load carried',
-    }
-    lines = [[text, *(_text(one[key]) for one in table.values())] for key, text in texts.items()]
-    print_table(('', *table), lines)
+    table = [values(each) for each in designs.values()]
+    lines = [[text, *(_text(one[key]) for one in table)] for key, text in _OF_DESIGNS.items()]
+    print_table(('', *designs), lines)
     if rows:
         print(f'\nother radii, limit {rows[0].criterion}')
-        print_table(
-            ('radius, m', 'pads', 'Pa', 'reach, N', 'rise, m'),
-            [
-                [f'{each.pad.radius:.5g}', *map(_text, map(_finite, (
-                    each.pads, each.pressure, each.reachable_load, each.rise_height
-                )))]
-                for each in rows
-            ],
-            texts=0,
-        )  # fmt: skip
+        _print_rows(_OF_RADII, [values(each) for each in rows], texts=0)
 
 
-def _print_candidates(found: Sequence[Candidate]) -> None:
-    first = found[0]
-    print(f'{first.pads} pads of radius {first.pad.radius:g} m\n')
+def _print_rows(heads: dict[str, str], rows: Sequence[dict[str, Any]], texts: int = 1) -> None:
+    print_table([*heads.values()], [[_text(row[name]) for name in heads] for row in rows], texts)
 
-    def span(ends: Sequence[float]) -> str:
-        value, low, high = map(_text, ends)
-        return value if low == high else f'{value} ({low} to {high})'
 
-    head = ('material', 'sheet, m', 'pressure, Pa', 'height, m', 'load, N', 'largest, Pa')
-    rows = [
-        [
-            *(each.material, f'{each.pad.thickness:g}', span(each.pressure), span(each.height)),
-            *(span(each.load), span(each.largest_pressure)),
-            ('' if each.balloons else 'over ') + span(each.ballooning_margin),
-            each.carried,
-        ]
-        for each in found
-    ]
-    print_table((*head, 'over pressure', 'carried'), rows)
+def _margin(row: dict[str, Any]) -> str:
+    return ('' if row['balloons'] else 'over ') + _text(row['ballooning_margin'])
 
 
 def _text(value: object) -> str:
     if isinstance(value, bool):
         return 'yes' if value else 'no'
+    if isinstance(value, list):  # a value with the ends of its interval
+        middle, low, high = ('none' if each is None else _text(each) for each in value)
+        return middle if low == high else f'{middle} ({low} to {high})'
     if isinstance(value, float):
-        if math.isinf(value):
-            return 'none'
         return f'{value:.0f}' if value >= 1e3 else f'{value:.3g}'
     return '-' if value is None else str(value)

@@ -11,9 +11,9 @@ import pathlib
 from ros_pad.commands.command import FILE, FOLDER, Commands, add_command, complain, print_table
 from ros_pad.commands.folder import PICTURES, check_pictures, refuse_existing
 from ros_pad.commands.progress import bar
-from ros_pad.commands.sweep import parameters
+from ros_pad.commands.sweep import pairs, typed
 from ros_pad.control import POLICIES
-from ros_pad.errors import BagError, InvalidInput
+from ros_pad.errors import BagError
 from ros_pad.trials import Replay, open_bag, replay, replayed_bag
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.node_settings import NodeSettings
@@ -73,10 +73,7 @@ def add(commands: Commands) -> None:
 def run(options: argparse.Namespace) -> int:
     """Replay the bag; return the exit status."""
     remaps = pairs('--remap', options.remap, ':=')
-    for name, value in pairs('--set', options.set, '=').items():
-        if ',' in value or ':' in value:  # a list or range, which parameters() accepts
-            raise InvalidInput(f'--set {name}={value}: one value is needed')
-    values = {name: each[0] for name, each in parameters(options.set).items()}
+    values = {name: typed(text) for name, text in pairs('--set', options.set, '=').items()}
     refuse_existing('--figure', options.figure, PICTURES)
     check_pictures(options.figure)
     refuse_existing('--out', options.out)
@@ -104,19 +101,6 @@ def run(options: argparse.Namespace) -> int:
         for path in filter(None, written.values()):
             print(path)
     return 1 if found.verdict == 'different' else 0
-
-
-def pairs(option: str, texts: list[str], sign: str) -> dict[str, str]:
-    """Return names and values of texts with a sign between; raise InvalidInput for others."""
-    found: dict[str, str] = {}
-    for text in texts:
-        name, _, value = text.partition(sign)
-        if not name or not value:
-            raise InvalidInput(f'{option} {text}: NAME{sign}VALUE is needed')
-        if name in found:
-            raise InvalidInput(f'{option} {text}: {name} is given twice')
-        found[name] = value
-    return found
 
 
 def _show(replay: Replay) -> None:

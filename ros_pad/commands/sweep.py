@@ -169,19 +169,25 @@ def seeds(text: str) -> list[int]:
     return found
 
 
-def parameters(texts: list[str]) -> dict[str, list[sweeps.Value]]:
-    """Return the values by name from texts ``NAME=VALUES``; raise InvalidInput for other texts."""
-    found: dict[str, list[sweeps.Value]] = {}
+def pairs(option: str, texts: Sequence[str], sign: str) -> dict[str, str]:
+    """Return names and values of texts with a sign between; raise InvalidInput for others."""
+    found: dict[str, str] = {}
     for text in texts:
-        name, _, values = text.partition('=')
-        if not name or not values:
-            raise InvalidInput(
-                f'--set {text}: NAME=VALUE,VALUE or NAME=START:STOP:COUNT is needed'
-            )
+        name, _, value = text.partition(sign)
+        if not name or not value:
+            raise InvalidInput(f'{option} {text}: NAME{sign}VALUE is needed')
         if name in found:
-            raise InvalidInput(f'--set {text}: {name} is given twice')
-        parts = [_value(each.strip()) for each in values.split(':' if ':' in values else ',')]
-        found[name] = _spaced(text, parts) if ':' in values else parts
+            raise InvalidInput(f'{option} {text}: {name} is given twice')
+        found[name] = value
+    return found
+
+
+def parameters(texts: Sequence[str]) -> dict[str, list[sweeps.Value]]:
+    """Return the values by name from texts ``NAME=VALUES``; raise InvalidInput for other texts."""
+    found = {}
+    for name, values in pairs('--set', texts, '=').items():
+        parts = [typed(each.strip()) for each in values.split(':' if ':' in values else ',')]
+        found[name] = _spaced(f'{name}={values}', parts) if ':' in values else parts
     return found
 
 
@@ -204,7 +210,8 @@ def _spaced(text: str, parts: Sequence[sweeps.Value]) -> list[sweeps.Value]:
     return list(spaced)
 
 
-def _value(text: str) -> sweeps.Value:
+def typed(text: str) -> sweeps.Value:
+    """Return a value as it is typed: a whole number, a number or a text."""
     for kind in (int, float):
         with contextlib.suppress(ValueError):
             return kind(text)

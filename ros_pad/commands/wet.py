@@ -16,7 +16,7 @@ import numpy as np
 
 from ros_pad.capillary import Mesh, Wet, WetPattern, WetSurface, wet, wet_pattern, wet_surface
 from ros_pad.capillary.layers import BALANCES
-from ros_pad.commands.command import Commands, add_command, complain
+from ros_pad.commands.command import Commands, add_command, complain, named
 from ros_pad.commands.folder import check_pictures
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import integer, number
@@ -25,18 +25,13 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import InvalidInput, MeshError, NoSurface
 
 LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
-# Of each shape: function that makes it, sizes that it needs, sizes that it allows.
-SHAPES: dict[str, tuple[Callable[..., Mesh], tuple[str, ...], tuple[str, ...]]] = {
-    'dome': (Mesh.dome, ('radius', 'contact_radius'), ('height', 'rings', 'sectors')),
-    'cone': (Mesh.cone, ('contact_radius', 'top_radius', 'height'), ('rings', 'sectors')),
-    'cylinder': (Mesh.cylinder, ('radius', 'height'), ('rings', 'sectors')),
-    'pattern': (
-        Mesh.dome_pattern,
-        ('pads', 'pitch', 'radius', 'contact_radius'),
-        ('height', 'rings', 'sectors'),
-    ),
+# Of each shape: function that makes it, and its sizes, in the order of that function.
+SHAPES: dict[str, tuple[Callable[..., Mesh], tuple[str, ...]]] = {
+    'dome': (Mesh.dome, ('radius', 'contact_radius', 'height')),
+    'cone': (Mesh.cone, ('contact_radius', 'top_radius', 'height')),
+    'cylinder': (Mesh.cylinder, ('radius', 'height')),
+    'pattern': (Mesh.dome_pattern, ('pads', 'pitch', 'radius', 'contact_radius', 'height')),
 }
-_SIZES = ('radius', 'contact_radius', 'top_radius', 'height', 'pitch', 'rings', 'sectors')
 _ADVICE = {
     'dry': 'by this balance the liquid does not rise: it does not wet the wall enough',
     'coarse': 'the layers are too thick for this rise: use more --layers, or cut the mesh lower',
@@ -79,93 +74,59 @@ size of that estimate (method layers), or with --hysteresis the largest force of
 line (both methods)"""
 
 
+# Of each option that is a number: in place of a value, help.
+_NUMBERS = {
+    'radius': ('M', 'radius of sphere or cylinder, m'),
+    'contact-radius': ('M', 'radius of the contact disc, m'),
+    'top-radius': ('M', 'radius of a cone at its top, m'),
+    'height': ('M', 'm (default for a dome: up to its widest section)'),
+    'pitch': ('M', 'distance of pads in a pattern, m'),
+    'scale': ('S', 'unit of a file in m: 1e-3 for mm (1)'),
+    'tension': ('N/M', 'surface tension of another liquid, N/m'),
+    'angle': ('DEG', 'contact angle, degrees'),
+    'density': ('KG/M3', 'density, kg/m³'),
+    'area': ('M2', 'of all pads with the gaps between them, m²'),
+    'direction': ('DEG', 'azimuth of the force, degrees (0)'),
+}
+
+
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'wet',
-        run,
-        _DESCRIPTION,
-        'pad wet dome --radius 1.55e-3 --contact-radius 0.6e-3 --figure dome.png',
-    )
-    part.add_argument('mesh', metavar='MESH', help=f'a file, or one of: {", ".join(SHAPES)}')
-    _add_mesh(part)
-    _add_liquid(part)
-    _add_method(part)
-    part.add_argument(
-        '--figure', metavar='FILE', help='draw the wetted mesh into a .png, .pdf or .svg'
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
-
-
-def _add_mesh(part: argparse.ArgumentParser) -> None:
-    shape = part.add_argument_group('shapes')
-    for name, text in (
-        ('radius', 'radius of sphere or cylinder, m'),
-        ('contact-radius', 'radius of the contact disc, m'),
-        ('top-radius', 'radius of a cone at its top, m'),
-        ('height', 'm (default for a dome: up to its widest section)'),
-        ('pitch', 'distance of pads in a pattern, m'),
-    ):
-        shape.add_argument(f'--{name}', type=float, metavar='M', help=text)
-    text = 'number of bands of triangles from floor to top'
-    shape.add_argument('--rings', type=int, metavar='N', help=text)
-    text = 'number of triangles round the axis'
-    shape.add_argument('--sectors', type=int, metavar='N', help=text)
-    file = part.add_argument_group('files')
-    text = 'unit of the file in m: 1e-3 for mm (1)'
-    file.add_argument('--scale', type=float, metavar='S', help=text)
-    file.add_argument('--lift', type=float, metavar='M', help='added to all heights, m (0)')
-    text = 'reverse the faces of a mesh that is inside out'
-    file.add_argument('--flip', action='store_true', help=text)
-
-
-def _add_liquid(part: argparse.ArgumentParser) -> None:
-    liquid = part.add_argument_group('liquid').add_argument
-    text = "surface tensions of water on silicone (default), or those of the thesis' appendix"
-    liquid('--liquid', choices=tuple(LIQUIDS), default='water', help=text)
-    liquid('--tension', type=float, metavar='N/M', help='surface tension of another liquid, N/m')
-    liquid('--angle', type=float, metavar='DEG', help='contact angle, degrees')
-    liquid('--density', type=float, metavar='KG/M3', help='density, kg/m³')
-    many = part.add_argument_group('many pads').add_argument
-    many('--pads', type=int, metavar='N', help='number of pads on the area')
-    many('--area', type=float, metavar='M2', help='of all pads with the gaps between them, m²')
-
-
-def _add_method(part: argparse.ArgumentParser) -> None:
+    example = 'pad wet dome --radius 1.55e-3 --contact-radius 0.6e-3 --figure dome.png'
+    part = add_command(commands, 'wet', run, _DESCRIPTION, example)
     add = part.add_argument
+    add('mesh', metavar='MESH', help=f'a file, or one of: {", ".join(SHAPES)}')
+    for name, (unit, text) in _NUMBERS.items():
+        add(f'--{name}', type=float, metavar=unit, help=text)
+    add('--pads', type=int, metavar='N', help='number of pads on the area')
+    text = "surface tensions of water on silicone (default), or those of the thesis' appendix"
+    add('--liquid', choices=tuple(LIQUIDS), default='water', help=text)
     add('--method', choices=('layers', 'energy'), default='layers', help='see above (%(default)s)')
     add('--balance', choices=BALANCES, help='of layers: what gives the height (energy)')
     text = 'also accept heights with large errors: to compare, not to use'
     add('--loose', action='store_true', help=text)
     text = 'number of layers from floor to top (100; many pads 200)'
     add('--layers', type=int, metavar='N', help=text)
-    add('--slices', type=int, metavar='N', help='number of slices round the axis (36)')
-    text = 'azimuth of the force, degrees (0)'
-    add('--direction', type=float, default=0.0, metavar='DEG', help=text)
     angles = ('ADVANCING', 'RECEDING')
     text = 'contact angles, degrees: the capillary force is then that of the pinned line'
     add('--hysteresis', type=float, nargs=2, metavar=angles, help=text)
+    add('--figure', metavar='FILE', help='draw the wetted mesh into a .png, .pdf or .svg')
+    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
     """Find the height of the liquid on the mesh and print it; return the exit status."""
-    number('--direction', options.direction, 'degrees', low=-math.inf)
+    direction = math.radians(
+        number('--direction', options.direction or 0.0, 'degrees', low=-math.inf)
+    )
     check_pictures(options.figure)
     liquid = _liquid(options)
     try:
         with bar('wetting', 2.0, 'steps', delay=1.0) as progress:
             mesh = _mesh(options)
             progress(1.0)
-            many = options.area is not None or options.mesh == 'pattern'
-            if options.pads is not None and not many:
-                raise InvalidInput('--pads needs --area, the area of all pads, m²')
             started = time.perf_counter()
-            found: Wet | WetPattern | WetSurface
-            if options.method == 'energy':
-                found = _of_least_energy(mesh, liquid, options)
-            else:
-                found = (_between if many else _round)(mesh, liquid, options)
+            found = _wet(mesh, liquid, options)
             spent = time.perf_counter() - started
             progress(2.0)
     except NoSurface as error:
@@ -180,22 +141,19 @@ def run(options: argparse.Namespace) -> int:
         'density_kg_per_m3': liquid.density,
         'method': options.method,
         'time_s': spent,
-        **_values(found, math.radians(options.direction)),
-        'height_error': _error(found, options),
-        'capillary_force_n': _of_a_foot(found, options),
+        **_values(found, direction),
+        'height_error': _error(found, options.loose),
+        'capillary_force_n': _of_a_foot(found, options, direction),
         'figure': options.figure,
     }
-    rows = _rows(values)
     if options.figure is not None:
         from ros_pad.reports import wetted
 
-        wetted.draw(options.figure, mesh, found, math.radians(options.direction))
+        wetted.draw(options.figure, mesh, found, direction)
     if options.json:
         print(json.dumps({name: _plain(value) for name, value in values.items()}))
     else:
-        width = max(len(words) for words, _ in rows)
-        for words, value in rows:
-            print(f'{words:{width}}  {value}')
+        _show(values)
     if values['status'] == 'ok' or isinstance(found, WetSurface):
         return 0
     worst = Counter(np.atleast_1d(found.status).tolist())
@@ -206,92 +164,63 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _liquid(options: argparse.Namespace) -> Liquid:
-    liquid = LIQUIDS[options.liquid]
     if options.tension is not None and options.angle is None:
         raise InvalidInput('--tension needs --angle: the contact angle depends on the liquid')
+    liquid = LIQUIDS[options.liquid]
+    given = {'surface_tension': options.tension, 'density': options.density}
     angle = liquid.angle if options.angle is None else math.radians(options.angle)
-    return replace(
-        liquid,
-        surface_tension=liquid.surface_tension if options.tension is None else options.tension,
-        density=liquid.density if options.density is None else options.density,
-        contact_angle=angle,
-    )
+    changes = {name: value for name, value in given.items() if value is not None}
+    return replace(liquid, **changes, contact_angle=angle)
 
 
 def _mesh(options: argparse.Namespace) -> Mesh:
-    given = {name for name in _SIZES if getattr(options, name) is not None}
-    of_files = {'scale', 'lift'} & {k for k, v in vars(options).items() if v is not None}
+    of_shapes = {name for _, sizes in SHAPES.values() for name in sizes} - {'pads'}
+    given = {name for name in {*of_shapes, 'scale'} if getattr(options, name) is not None}
     if options.mesh not in SHAPES:
-        if given:
+        if other := min(given - {'scale'}, default=None):
             raise InvalidInput(
-                f'{_option(min(given))} is only for shapes, and {options.mesh} is a file'
+                f'{_option(other)} is only for shapes, and {options.mesh} is a file'
             )
-        return Mesh.read(
-            options.mesh,
-            scale=1.0 if options.scale is None else options.scale,
-            lift=0.0 if options.lift is None else options.lift,
-            flip=options.flip,
-        )
-    make, needed, allowed = SHAPES[options.mesh]
-    missing = [name for name in needed if getattr(options, name) is None]
-    if missing:
-        raise InvalidInput(f'a {options.mesh} needs {" ".join(map(_option, missing))}')
-    other = sorted(of_files | given - {*needed, *allowed})
-    if other or options.flip:
-        name = _option(other[0] if other else 'flip')
-        raise InvalidInput(f'{name} is no option of the mesh {options.mesh}')
-    sizes = {
-        name: getattr(options, name) for name in (*needed, *allowed) if name in given | {'pads'}
-    }
+        return Mesh.read(options.mesh, scale=1.0 if options.scale is None else options.scale)
+    make, sizes = SHAPES[options.mesh]
+    optional = 'height' if 'contact_radius' in sizes and 'radius' in sizes else ''
+    if missing := [
+        _option(name) for name in sizes if name != optional and getattr(options, name) is None
+    ]:
+        raise InvalidInput(f'a {options.mesh} needs {" ".join(missing)}')
+    if other := min(given - {*sizes}, default=None):
+        raise InvalidInput(f'{_option(other)} is no option of the mesh {options.mesh}')
     if options.mesh == 'pattern' and options.method == 'energy':
         # One of many equal pads is drawn and computed.
-        make = Mesh.dome
-        number('--pitch', sizes.pop('pitch'), 'm', above=True)
-        integer('--pads', sizes.pop('pads'), 1)
-    if options.mesh in ('dome', 'pattern'):
-        sizes['sphere_radius'] = sizes.pop('radius')
-    if options.mesh != 'pattern':
-        sizes.pop('pads', None)
-    return make(**sizes)
+        number('--pitch', options.pitch, 'm', above=True)
+        make, sizes = SHAPES['dome']
+    return make(*(getattr(options, name) for name in sizes))
 
 
-def _round(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> Wet:
-    return wet(
-        mesh,
-        liquid,
-        options.balance or 'energy',
-        100 if options.layers is None else options.layers,
-        36 if options.slices is None else options.slices,
-        strict=not options.loose,
-    )
-
-
-def _between(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> WetPattern:
+def _wet(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> Wet | WetPattern | WetSurface:
+    """Solve by the method that the options ask for."""
+    area, pads = options.area, options.pads
+    if options.mesh == 'pattern' and area is None:  # each dome has its hexagon in the pattern
+        area = math.sqrt(0.75) * options.pitch**2 * pads
+    if area is None and pads is not None:
+        raise InvalidInput('--pads needs --area, the area of all pads, m²')
+    pads = 1 if pads is None else integer('pads', pads, 1)
+    if options.method == 'energy':
+        for name in ('balance', 'layers', 'loose'):
+            if getattr(options, name) not in (None, False):
+                raise InvalidInput(f'{_option(name)} is only for --method layers')
+        cell = None if area is None else number('--area', area, 'm²', above=True) / pads
+        return wet_surface(mesh, liquid, cell)
+    layers, strict = options.layers, not options.loose
+    balance = options.balance or 'energy'
+    if area is None:
+        return wet(mesh, liquid, balance, 100 if layers is None else layers, strict=strict)
     if options.hysteresis is not None:
         raise InvalidInput('--hysteresis is for a single pad, which has one contact line')
-    if options.slices is not None:
-        raise InvalidInput('--slices is for a single pad: between many pads the surface is level')
-    pads, area = 1 if options.pads is None else options.pads, options.area
-    if options.mesh == 'pattern':
-        # Without --area, each dome has the area of its hexagon in the pattern.
-        cells = math.sqrt(0.75) * options.pitch**2 * pads
-        pads, area = 1, cells if area is None else area
-    layers = 200 if options.layers is None else options.layers
-    strict = not options.loose
-    return wet_pattern(mesh, liquid, area, pads, options.balance or 'energy', layers, strict)
-
-
-def _of_least_energy(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> WetSurface:
-    for name in ('balance', 'layers', 'slices', 'loose'):
-        if getattr(options, name) not in (None, False):
-            raise InvalidInput(f'{_option(name)} is only for --method layers')
-    area = options.area
-    if area is not None:
-        pads = 1 if options.pads is None else integer('pads', options.pads, 1)
-        area = number('--area', area, 'm²', above=True) / pads
-    elif options.mesh == 'pattern':
-        area = math.sqrt(0.75) * options.pitch**2
-    return wet_surface(mesh, liquid, area)
+    pads = 1 if options.mesh == 'pattern' else pads
+    return wet_pattern(
+        mesh, liquid, area, pads, balance, 200 if layers is None else layers, strict
+    )
 
 
 def _option(name: str) -> str:
@@ -344,20 +273,19 @@ def _values(found: Wet | WetPattern | WetSurface, direction: float) -> dict[str,
     }
 
 
-def _error(
-    found: Wet | WetPattern | WetSurface, options: argparse.Namespace
-) -> list[float] | None:
+def _error(found: Wet | WetPattern | WetSurface, loose: bool) -> list[float] | None:
     """Return the lowest and highest relative error of the height; None where it has no bound."""
     if isinstance(found, WetSurface):
         return [-found.error, found.error]
-    if options.loose:
+    if loose:
         return None
     return list(_ERROR_OF_LEVEL if isinstance(found, WetPattern) else _ERRORS[found.balance])
 
 
-def _of_a_foot(found: Wet | WetPattern | WetSurface, options: argparse.Namespace) -> float | None:
+def _of_a_foot(
+    found: Wet | WetPattern | WetSurface, options: argparse.Namespace, direction: float
+) -> float | None:
     """Return the value of the key ``capillary_force`` in the file of a foot, N for each pad."""
-    direction = math.radians(options.direction)
     if isinstance(found, WetPattern):
         return abs(found.force) / (options.pads or 1)
     if options.hysteresis is None:
@@ -367,31 +295,13 @@ def _of_a_foot(found: Wet | WetPattern | WetSurface, options: argparse.Namespace
     return found.hysteresis_force(direction, advancing, receding)
 
 
-_UNITS = {
-    'n_per_m': 'N/m', 'kg_per_m3': 'kg/m³', 'm': 'm', 'm2': 'm²', 'm3': 'm³', 'pa': 'Pa',
-    'n': 'N', 'deg': '°', 's': 's',
-}  # fmt: skip
-
-
-def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return each name as words with its value and unit; leave out None and arrays."""
-    rows = []
-    for name, value in values.items():
-        if value is None or isinstance(value, np.ndarray):
-            continue
-        unit = next(
-            (unit for unit in sorted(_UNITS, key=len, reverse=True) if name.endswith(f'_{unit}')),
-            None,
-        )
-        words = (name if unit is None else name.removesuffix(f'_{unit}')).replace('_', ' ')
-        if isinstance(value, list):
-            text = ' to '.join(f'{100.0 * share:+.2g} %' for share in value)
-        elif isinstance(value, float):
-            text = 'no answer' if math.isnan(value) else f'{value:.6g} {_UNITS[unit or "m"]}'
-        else:
-            text = str(value)
-        rows.append((words, text))
-    return rows
+def _show(values: dict[str, Any]) -> None:
+    """Print each name as words with its value and unit; leave out None and arrays."""
+    shown = {k: v for k, v in values.items() if not (v is None or isinstance(v, np.ndarray))}
+    rows = [named(name, value) for name, value in shown.items()]
+    width = max(len(words) for words, _ in rows)
+    for words, text in rows:
+        print(f'{words:{width}}  {text}')
 
 
 def _plain(value: Any) -> Any:

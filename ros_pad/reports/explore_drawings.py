@@ -6,7 +6,6 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -16,7 +15,6 @@ from ros_pad.reports.explore import STATES, Explored
 from ros_pad.reports.style import BLACK, BLUE, PALE, STANCE, VERMILION
 
 WIDTH, HEIGHT = 480.0, 310.0
-NAMES = ('profile', 'grip')
 STYLE = f"""
 .drawing text {{ font: 12px system-ui, "DejaVu Sans", Arial, sans-serif; fill: {BLACK}; }}
 .drawing .end {{ text-anchor: end; }} .drawing .middle {{ text-anchor: middle; }}
@@ -32,14 +30,6 @@ STYLE = f"""
 """
 
 
-class Drawing(NamedTuple):
-    """Content of an SVG of :data:`WIDTH` and :data:`HEIGHT`, its title and its description."""
-
-    title: str
-    alt: str
-    body: str
-
-
 def _path(points: Iterable[tuple[float, float]], kind: str, closed: bool = False) -> str:
     places = ' '.join(f'{x:.1f},{y:.1f}' for x, y in points)
     return f'<path class="{kind}" d="M{places}{"Z" if closed else ""}"/>' if places else ''
@@ -47,6 +37,9 @@ def _path(points: Iterable[tuple[float, float]], kind: str, closed: bool = False
 
 def _text(x: float, y: float, words: str, kind: str = '', more: str = '') -> str:
     return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" {more}>{html.escape(words)}</text>'
+
+
+NOTHING = _text(0.5 * WIDTH, 0.5 * HEIGHT, 'no answer: see what is marked', 'middle')
 
 
 class Plot:
@@ -96,9 +89,14 @@ class Plot:
         )
 
 
-def drawings(found: Explored) -> dict[str, Drawing]:
-    """Return the drawings of the page by name."""
-    return {'profile': profile(found), 'grip': grip(found)}
+def drawings(found: Explored) -> str:
+    """Return the drawings of the page, as HTML."""
+    parts = (('One pad on the floor', *_profile(found)), ('Grip over load', *_grip(found)))
+    return ''.join(
+        f'<div><h2>{title}</h2><svg class="drawing" role="img" aria-label="{html.escape(alt)}"'
+        f' viewBox="0 0 {WIDTH:g} {HEIGHT:g}" xmlns="http://www.w3.org/2000/svg">{body}</svg></div>'
+        for title, alt, body in parts
+    )
 
 
 def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -> Array:
@@ -111,11 +109,11 @@ def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -
     return np.stack([sphere * np.cos(angle), middle + sphere * np.sin(angle)], axis=1)
 
 
-def profile(found: Explored) -> Drawing:
-    """Draw the dome free and pressed on the floor; cut through its axis."""
+def _profile(found: Explored) -> tuple[str, str]:
+    """Return description and drawing of the dome, free and pressed, cut through its axis."""
     radius, free, pressed = found.inputs['radius'], found.free, found.pressed
     if found.free is None and found.pressed is None:
-        return Drawing('One pad on the floor', 'There is no dome.', _nothing())
+        return 'There is no dome.', NOTHING
     tall = max(radius, *(each.height for each in (free, pressed) if each is not None), 0.0)
     scale = min((WIDTH - 40.0) / (3.2 * radius), (HEIGHT - 96.0) / tall)
     base, centre = 44.0, 0.5 * WIDTH
@@ -145,14 +143,14 @@ def profile(found: Explored) -> Drawing:
         ]
         words = f'contact radius {1e3 * b:.3g} mm, solid: pressed, dashed: free'
     body.append(_text(centre, HEIGHT - 10.0, words, 'middle'))
-    return Drawing('One pad on the floor', f'Cut through one pad. {words}.', ''.join(body))
+    return f'Cut through one pad. {words}.', ''.join(body)
 
 
-def grip(found: Explored) -> Drawing:
-    """Draw the tangential capacity over the load in four states."""
-    title, load = 'Grip over load', found.inputs['load']
+def _grip(found: Explored) -> tuple[str, str]:
+    """Return description and drawing of the tangential capacity over the load in four states."""
+    load = found.inputs['load']
     if not found.curves:
-        return Drawing(title, 'No grip can be computed.', _nothing())
+        return 'No grip can be computed.', NOTHING
     loads = found.loads[:-1].tolist()
     top = 1.05 * max(float(each[:-1].max()) for each in found.curves.values())
     plot = Plot(max(loads), top, 'load on the foot, N', 'tangential capacity, N')
@@ -169,17 +167,4 @@ def grip(found: Explored) -> Drawing:
             _text(x + 31.0, 16.0, state),
         ]
     alt = '; '.join(f'{state} {value:.3g} N' for state, value in found.grip.items())
-    return Drawing(title, f'Tangential capacity at the load: {alt}.', ''.join(plot.parts))
-
-
-def _nothing() -> str:
-    return _text(0.5 * WIDTH, 0.5 * HEIGHT, 'no answer: see what is marked', 'middle')
-
-
-def svg(drawing: Drawing) -> str:
-    """Return a drawing as an element of a page."""
-    alt = html.escape(drawing.alt, quote=True)
-    return (
-        f'<svg class="drawing" role="img" aria-label="{alt}" viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
-        f' xmlns="http://www.w3.org/2000/svg">{drawing.body}</svg>'
-    )
+    return f'Tangential capacity at the load: {alt}.', ''.join(plot.parts)

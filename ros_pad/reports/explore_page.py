@@ -170,7 +170,6 @@ class Page:
         self._answers = 0
         self._controls: dict[str, Any] = {}
         self._remarks: dict[str, Any] = {}
-        self._figures: dict[str, Any] = {}
 
     def build(self) -> None:
         """Make the elements of the page, and ask for the first answer."""
@@ -195,9 +194,8 @@ class Page:
                             else:
                                 self._choice(name)
                             self._remarks[name] = ui.html(sanitize=False)
-            with ui.element('section').classes('figures').props('aria-label="Drawings"') as both:
-                for name in explore_drawings.NAMES:
-                    self._figures[name] = ui.html(sanitize=False)
+            with ui.element('section').props('aria-label="Drawings"') as both:
+                self._figures = ui.html(sanitize=False)
             with ui.element('section').classes('answer').props('aria-label="Numbers"') as numbers:
                 self._numbers = ui.html(sanitize=False)
                 ui.html(f'<p class="note">{NOTE}</p>', sanitize=False)
@@ -260,13 +258,12 @@ class Page:
         for each in self._pale:
             each.classes(add='stale') if words else each.classes(remove='stale')
 
-    def _show(self, answer: tuple[Explored, dict[str, str], str]) -> None:
+    def _show(self, answer: tuple[Explored, str, str]) -> None:
         found, figures, numbers = answer
         # A material has its stiffness from its law.
         self._controls['stiffness'].set_visibility(found.inputs['material'] == MEASURED)
         self._answers += 1
-        for name, figure in figures.items():
-            self._figures[name].set_content(figure)
+        self._figures.set_content(f'<div class="figures">{figures}</div>')
         for name, element in self._remarks.items():
             element.set_content(
                 ''.join(
@@ -310,13 +307,9 @@ def foot_file(foot: Foot) -> str:
     return foot_text(foot, f'{foot.source}, explored', head, comments)
 
 
-def answer(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
+def answer(inputs: Inputs) -> tuple[Explored, str, str]:
     """Return the answer to the inputs, its drawings and its numbers, as HTML."""
     found = explore(inputs)
-    figures = {
-        name: f'<h2>{each.title}</h2>{explore_drawings.svg(each)}'
-        for name, each in explore_drawings.drawings(found).items()
-    }
     numbers = ''
     for title, group in rows(found).items():
         lines = ''.join(
@@ -324,4 +317,4 @@ def answer(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
             for key, (label, text) in group.items()
         )
         numbers += f'<div><h2>{title}</h2><dl>{lines}</dl></div>'
-    return found, figures, numbers
+    return found, explore_drawings.drawings(found), numbers

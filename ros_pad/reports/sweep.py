@@ -9,7 +9,6 @@ import os
 import shlex
 from collections.abc import Sequence
 from typing import Any
-from urllib.parse import quote
 
 import matplotlib
 import numpy as np
@@ -291,7 +290,7 @@ def _failures(found: Found, rows: Sequence[tuple[str, Row]]) -> str:
 def _swept(found: Found) -> str:
     sweep, about = found.sweep, found.about
     levels = sorted({str(row['level']) for row in found.rows})
-    text = plain_table(
+    return plain_table(
         [
             ('scenes', ', '.join(sweep.scenes)),
             ('policies', ', '.join(sweep.policies)),
@@ -302,12 +301,6 @@ def _swept(found: Found) -> str:
             ('all numbers', 'trials.csv beside this page, one row for each trial'),
         ]
     )
-    links = [
-        f'<a href="{quote(each.relative_to(found.folder).as_posix())}">'
-        f'{html.escape(each.parent.name)}</a>'
-        for each in sorted(found.folder.glob('*/report.html'))
-    ]
-    return text + (f'<p>Reports of trials: {", ".join(links)}</p>' if links else '')
 
 
 def _seeds(seeds: Sequence[int]) -> str:

@@ -56,23 +56,20 @@ def picture(mesh: Mesh, found: Wet | WetPattern | WetSurface) -> Picture:
         # Without a solution, draw nothing wet, as for a single pad.
         dry, wetted = split(triangles, triangles[:, :, 2] - np.nan_to_num(level))
         return Picture(dry, wetted, _disc(mesh, found, level), np.empty((0, 3)))
-    x, y, z = np.moveaxis(triangles, 2, 0)
     if isinstance(found, WetSurface):
         turns = np.arctan2(*(found.line[:, :2] - found.axis).T[::-1])
-        around = np.arctan2(y - 1e3 * found.axis[1], x - 1e3 * found.axis[0])
-        level = np.interp(around, turns, 1e3 * found.line[:, 2], period=2.0 * math.pi)
-        dry, wetted = split(triangles, z - level)
-        near = _near(mesh, found)
+        heights, surface = found.line[:, 2], _near(mesh, found)[:, [0, 1, 2, 2]]
         line = 1e3 * np.concatenate([found.line, found.line[:1]])
-        return Picture(dry, wetted, near[:, [0, 1, 2, 2]], line)
-    turn = np.arctan2(y - 1e3 * found.axis[1], x - 1e3 * found.axis[0])
-    heights = np.nan_to_num(found.heights)
-    level = 1e3 * np.interp(turn, found.azimuths, heights, period=2.0 * math.pi)
-    dry, wetted = split(triangles, z - level)
-    grid = 1e3 * found.surface(9)
-    grid = np.concatenate([grid, grid[:1]])
-    surface = _quads(grid)
-    return Picture(dry, wetted, surface[np.isfinite(surface).all(axis=(1, 2))], grid[:, -1])
+    else:
+        turns, heights = found.azimuths, np.nan_to_num(found.heights)
+        grid = 1e3 * found.surface(9)
+        grid = np.concatenate([grid, grid[:1]])
+        surface, line = _quads(grid), grid[:, -1]
+        surface = surface[np.isfinite(surface).all(axis=(1, 2))]
+    x, y, z = np.moveaxis(triangles, 2, 0)
+    around = np.arctan2(y - 1e3 * found.axis[1], x - 1e3 * found.axis[0])
+    level = 1e3 * np.interp(around, turns, heights, period=2.0 * math.pi)
+    return Picture(*split(triangles, z - level), surface, line)
 
 
 def _near(mesh: Mesh, found: WetSurface) -> Array:
@@ -172,10 +169,12 @@ def _figure(mesh: Mesh, found: Wet | WetPattern | WetSurface, direction: float) 
     plane = figure.add_axes((0.645, 0.17, 0.33, 0.70))
     _body(body, picture(mesh, found), 1.0 if isinstance(found, WetPattern) else 1.2)
     if isinstance(found, WetPattern):
+        title = '(b) room between pads'
         _void(plane, mesh, found)
     else:
+        title = f'(b) section at {math.degrees(direction):g}°'
         _section(plane, mesh, found, direction)
-    for place, words in ((0.015, '(a) pad and liquid'), (0.60, _title(found, direction))):
+    for place, words in ((0.015, '(a) pad and liquid'), (0.60, title)):
         figure.text(place, 0.94, words, fontsize=8.0)
     figure.legend(
         *plane.get_legend_handles_labels(),
@@ -185,12 +184,6 @@ def _figure(mesh: Mesh, found: Wet | WetPattern | WetSurface, direction: float) 
         handlelength=1.2,
     )
     return figure
-
-
-def _title(found: Wet | WetPattern | WetSurface, direction: float) -> str:
-    if isinstance(found, WetPattern):
-        return '(b) room between pads'
-    return f'(b) section at {math.degrees(direction):g}°'
 
 
 def _body(axes: Axes3D, drawn: Picture, zoom: float) -> None:

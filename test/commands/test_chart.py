@@ -16,11 +16,6 @@ from ros_pad.commands.chart import CHARTS
 from studies.__main__ import STUDIES
 
 PACKAGE = pathlib.Path(cli.__file__).resolve().parent
-DOORS = (
-    ('chart', 'contact'),
-    ('report', '--thesis'),
-    ('run', 'bench_press'),
-)
 
 
 @pytest.fixture
@@ -56,13 +51,7 @@ def test_a_report_of_nothing_is_refused(words, runs, tmp_path, capsys, monkeypat
     assert runs == list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    'words',
-    [
-        *(['--policy', 'dome'], ['--seed', '1'], ['--live']),
-    ],
-    ids=' '.join,
-)
+@pytest.mark.parametrize('words', [['--seed', '1'], ['--live']], ids=' '.join)
 def test_a_bench_scene_refuses_options_of_a_walk(words, runs, capsys):
     assert cli.main(['run', 'bench_press', *words]) == 2
     assert f'{words[0]} is not allowed: bench_press' in capsys.readouterr().err
@@ -81,13 +70,12 @@ def test_a_bench_scene_runs_in_a_checkout(tmp_path):
     assert (out / 'report.html').is_file()
 
 
-@pytest.mark.parametrize('words', DOORS)
-def test_without_a_checkout_it_is_written_where_studies_are(words, tmp_path):
+def test_without_a_checkout_it_is_written_where_studies_are(tmp_path):
     """The package is copied to a folder without studies."""
     shutil.copytree(PACKAGE, tmp_path / 'ros_pad', ignore=shutil.ignore_patterns('__pycache__'))
     shutil.copytree(PACKAGE.parent / 'config', tmp_path / 'config')
     found = subprocess.run(
-        [sys.executable, '-m', 'ros_pad.cli', *words],
+        [sys.executable, '-m', 'ros_pad.cli', 'chart', 'contact'],
         capture_output=True,
         text=True,
         cwd=tmp_path,

@@ -54,7 +54,6 @@ def test_what_is_given_goes_before_the_foot(capsys):
 @pytest.mark.parametrize(
     ('arguments', 'parts'),
     [
-        (['25'], ['cannot be carried', 'pads would be enough', '90000 Pa']),
         (['25', '--criterion', 'measured'], ['64 pads would be enough']),
         (['16', '--pressure', '80e3', '--criterion', 'measured'], ['A supply of 82']),
         (['7'], ['is carried: 51 pads']),
@@ -67,21 +66,11 @@ def test_words_say_what_would_carry(arguments, parts, capsys):
         assert part in printed
 
 
-def test_what_would_do_does(capsys):
-    heavy = said(capsys, '--load', '25', '--sole-radius', '0.017')['designs'][0]
-    assert not heavy['carried']
-    area = heavy['pads_needed'] * 4.5 * math.sqrt(3) * 1.5e-3**2
-    radius = str(math.sqrt(area / math.pi) * (1.0 + 1e-9))
-    assert said(capsys, '--load', '25', '--sole-radius', radius)['designs'][0]['carried']
-
-
 @pytest.mark.parametrize(
     ('arguments', 'part'),
     [
         (['--load', '7'], '--sole-radius'),
         (['--load', '0', '--sole-radius', '0.02'], 'load = 0'),
-        (['--load', '7', '--sole-radius', '1e-3'], 'radius 0.0015 m = 3.1415'),
-        (['--load', '7', '--foot', 'huge'], 'large37'),
         (['--load', '7', *SMALL, '--figure', 'design.txt'], '.png'),
     ],
 )
@@ -152,6 +141,7 @@ class TestMaterials:
         assert [each['carried'] for each in found] == ['yes', 'yes', 'in doubt', 'yes']
         assert (values['criterion'], values['ceiling']) == ('flattening', 60e3)
         assert '3 of 4 candidates carry 2 N at up to 60000 Pa' in values['says'][0]
+        assert '; 1 more if' in values['says'][0]
 
     def test_the_table_and_the_picture(self, tmp_path, capsys):
         path = tmp_path / 'materials.png'
@@ -195,10 +185,8 @@ class TestMaterials:
     @pytest.mark.parametrize(
         ('arguments', 'part'),
         [
-            (['--material', 'clay'], "no material named 'clay'"),
             (['--material', 'all', '--stiffness', '40'], '--stiffness is not allowed with'),
             (['--thickness', '4e-4'], '--thickness needs --material'),
-            (['--material', 'all', '--thickness', '2e-3'], 'thickness = 0.002 is not allowed'),
         ],
     )
     def test_bad_input(self, arguments, part, capsys):

@@ -71,9 +71,7 @@ def test_a_backend_talks_to_its_emulator(
             "--units: option of smc_itv = 'units' is not allowed: one of full",
         ),
         (['alicat', '--fault', 'fire'], "fault = 'fire' is not allowed: one of silence"),
-        (['alicat', '--fault', 'silence:5:4'], 'KIND[:START[:END]] is needed'),
         (['alicat', '--unit-ids', 'ab'], "unit_ids = 'ab' is not allowed: [A-Z]+"),
-        (['serial_text', '--channels', '0'], 'from 1 to 99 is needed'),
     ],
 )
 def test_bad_arguments_are_reported(arguments, words, capsys: pytest.CaptureFixture[str]):

@@ -3,7 +3,6 @@ import contextlib
 import os
 import pathlib
 import pty
-import re
 import select
 import signal
 import subprocess
@@ -11,12 +10,8 @@ import sys
 import termios
 
 import pytest
-from tqdm import tqdm
 
-from ros_pad import cli
 from ros_pad.commands.progress import bar
-
-BAG = pathlib.Path(__file__).parents[2] / 'bags' / 'hexapod_patches' / 'bag' / 'bag_0.mcap'
 
 
 def test_what_is_done_is_full_and_what_was_interrupted_stays(capsys):
@@ -34,33 +29,6 @@ def test_a_file_has_few_lines(capsys):
         for second in range(10_001):
             reach(second)
     assert capsys.readouterr().err.count('walk') <= 3
-    with bar('candidates', 1.0, delay=1e-9) as reach:
-        reach(0.5)
-    assert capsys.readouterr().err == ''
-
-
-@pytest.mark.parametrize(
-    'words, bars',
-    [
-        (['bag', 'repair', 'cut.mcap'], ['reading', 'writing']),
-        (['replay', str(BAG.parent), '--out', 'replayed'], ['replay', 'writing']),
-    ],
-)
-def test_long_tasks_report_their_progress(words, bars, tmp_path, monkeypatch, capsys):
-    """Every report is shown: a bar without reports would go from 0 to 100 %."""
-    monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
-    monkeypatch.setattr(
-        'ros_pad.commands.progress.tqdm',
-        lambda **given: tqdm(**given | {'delay': 0.0, 'mininterval': 0.0}),
-    )
-    monkeypatch.setattr('ros_pad.bags.storage._BATCH_SIZE', 100_000)
-    monkeypatch.chdir(tmp_path)
-    pathlib.Path('cut.mcap').write_bytes(BAG.read_bytes()[:500_000])
-    cli.main(words)
-    said = capsys.readouterr().err
-    for name in bars:
-        shares = re.findall(rf'{name} +(\d+)% .*?<(?:\d\d:\d\d|\?)\]', said)
-        assert any(0 < int(share) < 100 for share in shares), said
 
 
 def test_ctrl_c_leaves_the_terminal_clean(tmp_path):

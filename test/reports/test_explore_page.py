@@ -4,7 +4,6 @@
 import asyncio
 import json
 import signal
-import socket
 import sys
 import threading
 import urllib.error
@@ -192,15 +191,3 @@ def test_without_the_extra_the_remedy_is_printed(monkeypatch, capsys):
     said = capsys.readouterr()
     assert said.out == ''
     assert "pip install 'ros_pad[explore]'" in said.err
-
-
-def test_what_cannot_be_served_is_refused(capsys):
-    with socket.create_server(('127.0.0.1', 0)) as taken:
-        port = str(taken.getsockname()[1])
-        for words, message in (
-            (['--port', port], f'--port {port}: Address already in use'),
-            (['--port', '0'], '--port = 0 is not allowed: a whole number from 1 to 65535'),
-            (['no_foot'], "no foot named 'no_foot'"),
-        ):
-            assert cli.main(['explore', '--no-browser', *words]) == 2
-            assert message in capsys.readouterr().err

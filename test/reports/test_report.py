@@ -20,7 +20,6 @@ from ros_pad.reports.view import view_of, window_of
 from ros_pad.simulation import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import conditions, run
-from ros_pad.trials.label import described
 from ros_pad.trials.trial import Metrics, Trial
 
 # HTML elements without a closing tag.
@@ -378,19 +377,6 @@ def test_conditions_have_values_and_units(walk):
         'pad run hexapod_patches --policy adaptive --seed 0 --fidelity L2 --cycles 3'
         ' --foot large37'
     )
-
-
-def test_conditions_are_those_recorded(walk):
-    said = described(dataclasses.replace(Scene.load('hexapod_patches'), dome_pressure=70e3))
-    said['tow']['weight'] = 7.5
-    settings = walk.settings | {
-        'conditions': json.loads(json.dumps(said)),
-        'versions': {'git': 'v0.1-3-gabcdef', 'numpy': '2.0.1'},
-    }
-    rows = dict(conditions.rows(dataclasses.replace(walk, settings=settings)))
-    assert 'weight 7.5 N' in rows['towed load']
-    assert rows['pressure of a dome'].startswith('70000 Pa gauge')
-    assert rows['versions'] == 'git v0.1-3-gabcdef, numpy 2.0.1'
 
 
 def test_figures_for_a_paper(tmp_path):
