@@ -216,9 +216,8 @@ def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
     def error_of(name: str) -> str:
         if not importlib.util.find_spec(name):
             return 'not installed'
-        return _child(f'import sys; sys.path[:] = {sys.path!r}; import {name}', f'import {name}')[
-            0
-        ]
+        code = f'import sys; sys.path[:] = {sys.path!r}; import {name}'
+        return _child(code, f'import {name}')[0]
 
     with ThreadPoolExecutor() as pool:
         errors = list(pool.map(error_of, names))

@@ -40,10 +40,8 @@ def findings(options: argparse.Namespace) -> Iterator[Check]:
     if robot.mass > 0.0:
         yield Check('robot', 'ok', about)
     else:
-        text = (
-            'its links have no mass, <inertial> with <mass>: the body estimator needs the weight'
-        )
-        yield Check('robot', 'problem', f'{about}: {text}')
+        text = f'{about}: its links have no mass, <inertial> with <mass>: the body estimator'
+        yield Check('robot', 'problem', f'{text} needs the weight')
     messages, topics = (_recorded if options.bag else _live)(options, mapping, seconds)
     found: _Readings = defaultdict(list)
     refused: dict[str, str] = {}

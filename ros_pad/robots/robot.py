@@ -108,8 +108,6 @@ class Robot:
         Transform from the IMU to the base, m.
     chains : Chains
         Kinematics of the legs.
-    hips : array (legs, 3)
-        Places of the first joints on the base, m.
     home : array (legs, joints a leg)
         Joint positions in which the robot stands, rad.
     gait : Gait or None
@@ -135,7 +133,6 @@ class Robot:
     foot_radius: float
     imu: Array
     chains: Chains
-    hips: Array
     home: Array
     gait: Gait | None
     servo: Servo | None
@@ -207,6 +204,11 @@ class Robot:
             raise ConfigError(f'{path}: {error}') from error
         return robot
 
+    @property
+    def hips(self) -> Array:
+        """Places of the first joints on the base, (legs, 3), m."""
+        return np.array([leg[0].at[:3, 3] for leg in self.chains.legs])
+
     def kinematics(self, q: npt.ArrayLike) -> Kinematics:
         """Return positions, rotations and Jacobians of all feet in the axes of the base.
 
@@ -247,26 +249,6 @@ class Robot:
         """
         return self.kinematics(q).positions
 
-    def foot_rotations(self, q: npt.ArrayLike) -> Array:
-        """Return the rotations from the links of the feet to the base.
-
-        Parameters
-        ----------
-        q : array (joints,) or (legs, joints a leg)
-            Joint positions, rad (m where a joint slides).
-
-        Returns
-        -------
-        array (legs, 3, 3)
-            Rotations, dimensionless.
-
-        Raises
-        ------
-        InvalidInput
-            When ``q`` has another shape or values that are not finite.
-        """
-        return self.kinematics(q).rotations
-
     def foot_jacobians(self, q: npt.ArrayLike) -> Array:
         """Return the feet's velocities for each joint velocity.
 
@@ -286,26 +268,6 @@ class Robot:
             When ``q`` has another shape or values that are not finite.
         """
         return self.kinematics(q).jacobians
-
-    def angular_jacobians(self, q: npt.ArrayLike) -> Array:
-        """Return the feet's angular velocities for each joint velocity.
-
-        Parameters
-        ----------
-        q : array (joints,) or (legs, joints a leg)
-            Joint positions, rad (m where a joint slides).
-
-        Returns
-        -------
-        array (legs, 3, joints)
-            Jacobians, no unit (rad/m where a joint slides).
-
-        Raises
-        ------
-        InvalidInput
-            When ``q`` has another shape or values that are not finite.
-        """
-        return self.kinematics(q).angular
 
     def gravity_torques(self, q: npt.ArrayLike, gravity: npt.ArrayLike = _DOWN) -> Array:
         """Return the joint torques that hold the links of the legs up.
@@ -460,7 +422,6 @@ def _assembled(
         legs=tuple(legs),
         joint_names=tuple(joint.name for leg in joints for joint in leg),
         chains=chains,
-        hips=np.array([leg[0].at[:3, 3] for leg in joints]),
         home=home,
         **(whole | {key: value for key, value in others.items() if value is not None}),
     )

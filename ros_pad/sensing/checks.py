@@ -225,7 +225,10 @@ def check(recording: Recording) -> list[Check]:
     list of Check
         What is wrong, and what could not be judged; empty if nothing is.
     """
-    found = [*_stamps(recording), *_angles(recording)]
+    found = _stamps(recording)
+    if (most := float(np.abs(recording.positions).max())) >= 7.0:
+        text = f'positions up to {most:.3g} rad (or m), over 7: degrees?'
+        found.append(Check('joints', 'problem', text))
     if any(each.status == 'problem' for each in found):
         return found  # without times and angles, nothing else can be judged
     found += [*_rates(recording), *_gravity(recording)]
@@ -251,8 +254,7 @@ def _stamps(recording: Recording) -> list[Check]:
     ):
         back = int((np.diff(times) <= 0.0).sum())
         if back:
-            text = f'{back} stamps are not after the one before'
-            found.append(Check(what, 'problem', text))
+            found.append(Check(what, 'problem', f'{back} stamps are not after the one before'))
         elif len(arrival) == len(times):
             ratios.append((what, float((arrival[-1] - arrival[0]) / (times[-1] - times[0]))))
             offsets.append(float(np.median(times - arrival)))
@@ -272,14 +274,6 @@ def _stamps(recording: Recording) -> list[Check]:
         text = f'they differ from the time of arrival by {offsets[0]:.3g} s, over 1 s'
         return [Check('stamps', 'warning', f'{text}: another clock')]
     return []
-
-
-def _angles(recording: Recording) -> list[Check]:
-    """Check that joint positions are angles of legs, in rad, or lengths, in m."""
-    most = float(np.abs(recording.positions).max())
-    if most < 7.0:
-        return []
-    return [Check('joints', 'problem', f'positions up to {most:.3g} rad (or m), over 7: degrees?')]
 
 
 def _rates(recording: Recording) -> list[Check]:
@@ -360,9 +354,8 @@ def _fit(recording: Recording) -> tuple[Array, Array]:
     rate = recording.mean(recording.rate())[first]
     lines = (skew(arm)[..., None] * rate[:, None, None]).reshape(-1, 9)
     matrix = np.linalg.lstsq(lines, drift.ravel(), rcond=None)[0]
-    return np.asarray(matrix.reshape(3, 3), dtype=float), _sizes(
-        drift - (lines @ matrix).reshape(-1, 3)
-    )
+    left = drift - (lines @ matrix).reshape(-1, 3)
+    return np.asarray(matrix.reshape(3, 3), dtype=float), _sizes(left)
 
 
 def _errors(recording: Recording, turn: Array | None = None, late: float = 0.0) -> Array:
@@ -423,10 +416,8 @@ def _levels(recording: Recording) -> list[Check]:
     off[above] = np.maximum(off[above], 0.03)
     if off.max() < 0.03:
         return []
-    text = (
-        f'at rest foot {robot.legs[int(off.argmax())]} is {off.max():.2g} m off the plane of the'
-    )
-    return [Check('feet', 'problem', f'{text} others, 0.03 m on a flat floor at most')]
+    text = f'at rest foot {robot.legs[int(off.argmax())]} is {off.max():.2g} m off the plane of'
+    return [Check('feet', 'problem', f'{text} the others, 0.03 m on a flat floor at most')]
 
 
 def _delay(recording: Recording) -> list[Check]:

@@ -229,12 +229,8 @@ class BodyEstimator:
 
     def _reset(self) -> None:
         """Discard everything."""
-        robot, legs, noise, options = (
-            self._robot,
-            len(self._robot.legs),
-            self._noise,
-            self._options,
-        )
+        robot, noise, options = self._robot, self._noise, self._options
+        legs = len(robot.legs)
         gate = GATE if options.rejection else math.inf
         self._filter = BodyFilter(legs, noise.gyro, noise.accelerometer, gate)
         self._window = SlipWindow(
@@ -510,27 +506,28 @@ class BodyEstimator:
         """Update which feet slip: those that slip have a foothold only in height."""
         if not self._options.rejection:
             return
+        state = self._feet
         speeds = np.hypot(slips[:, 0], slips[:, 1])
-        fresh = self._feet.standing & ~self._feet.left_out
+        fresh = state.standing & ~state.left_out
         fresh &= self._filter.rejected | (speeds > FAST * deviations)
-        self._feet.patience[fresh] = STICKS
+        state.patience[fresh] = STICKS
         now = self._window.latest
-        slow = self._feet.standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < SLOW * latest)
-        self._feet.slow_since = np.where(slow, np.minimum(self._feet.slow_since, time), math.inf)
-        self._feet.left_out |= fresh
-        self._feet.left_out &= ~(time - self._feet.slow_since >= self._feet.patience)
+        slow = state.standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < SLOW * latest)
+        state.slow_since = np.where(slow, np.minimum(state.slow_since, time), math.inf)
+        state.left_out |= fresh
+        state.left_out &= ~(time - state.slow_since >= state.patience)
         lifted = self._filter.lifted
-        if self._feet.left_out.any():
-            self._filter.set_down(self._feet.left_out & ~lifted, *feet, level=True)
+        if state.left_out.any():
+            self._filter.set_down(state.left_out & ~lifted, *feet, level=True)
         if lifted.any():
             self._filter.set_down(lifted, *feet)
-        sticking = self._feet.standing & ~self._feet.left_out
+        sticking = state.standing & ~state.left_out
         if sticking.any():
-            self._feet.held = time
-        if sticking.any() or not self._feet.standing.any():
-            self._feet.sliding_since = time
-        elif time - self._feet.sliding_since > LOST and self._feet.standing.sum() > 1:
-            self._regain(time, slips[self._feet.standing])
+            state.held = time
+        if sticking.any() or not state.standing.any():
+            state.sliding_since = time
+        elif time - state.sliding_since > LOST and state.standing.sum() > 1:
+            self._regain(time, slips[state.standing])
 
     def _regain(self, time: float, slips: Array) -> None:
         """Take feet to stick that all slip alike for long: more likely the velocity is wrong."""
@@ -545,55 +542,53 @@ class BodyEstimator:
 
         Return whether what was learnt about them was discarded.
         """
-        radius = self._noise.radius
-        changed = self._checks.legs.update(
-            dt, self._feet.standing, self._feet.left_out, slips, moves
-        )
+        feet, legs, noise = self._feet, self._checks.legs, self._noise
+        changed = legs.update(dt, feet.standing, feet.left_out, slips, moves)
         if changed or self._checks.unloaded.found:
             # What such legs, or feet that were in the air, have shown is wrong.
-            self._filter.reshape(self._robot.foot_radius, radius, 0.0, self._noise.length)
+            self._filter.reshape(self._robot.foot_radius, noise.radius, 0.0, noise.length)
             return True
-        self._filter.creep = CREEP * self._checks.legs.slippery
+        self._filter.creep = CREEP * legs.slippery
         # Joints that are late look like legs of another length, too.
-        if not time < self._length.look and not self._checks.delay.doubt():
-            self._length.look = time + LOOK
-            scale, deviation = self._filter.scale, self._filter.deviations[1]
-            learnt = self._noise.length**2 - deviation**2
-            if self._length.stretched:
-                if deviation > KNOWN_LENGTH:
-                    self._doubts.add(
-                        time,
-                        'kinematics: legs seem to be longer or shorter than in the file of the'
-                        f' robot, by {100.0 * scale:.0f} +- {100.0 * deviation:.0f} %',
-                    )
-            # Feet that slip for most of their stances look like legs of another length.
-            elif (
-                self._checks.legs.sticks
-                and learnt > LEARNT * self._noise.length**2
-                and abs(scale)
-                > max(WRONG_LENGTH * learnt / self._noise.length**2, 4.0 * math.sqrt(learnt))
-            ):
-                self._length.stretched = True
-                self._filter.reshape(self._robot.foot_radius, radius, 0.0, UNKNOWN_LENGTH)
-                return True
-        return False
+        if time < self._length.look or self._checks.delay.doubt():
+            return False
+        self._length.look = time + LOOK
+        scale, deviation = self._filter.scale, self._filter.deviations[1]
+        if self._length.stretched:
+            if deviation > KNOWN_LENGTH:
+                self._doubts.add(
+                    time,
+                    'kinematics: legs seem to be longer or shorter than in the file of the'
+                    f' robot, by {100.0 * scale:.0f} +- {100.0 * deviation:.0f} %',
+                )
+            return False
+        learnt = noise.length**2 - deviation**2
+        # Feet that slip for most of their stances look like legs of another length.
+        if not legs.sticks or learnt <= LEARNT * noise.length**2:
+            return False
+        most = max(WRONG_LENGTH * learnt / noise.length**2, 4.0 * math.sqrt(learnt))
+        self._length.stretched = abs(scale) > most
+        if self._length.stretched:
+            self._filter.reshape(self._robot.foot_radius, noise.radius, 0.0, UNKNOWN_LENGTH)
+        return self._length.stretched
 
     def _rest(self, time: float, gyro: Array, dq: Array) -> None:
         """Average the gyro while nothing moves, and correct its bias."""
+        noise, rests, body = self._noise, self._rests, self._filter
+        turning = 0.02 + 5.0 * noise.gyro + 3.0 * math.sqrt(body.covariance[9, 9])
         still = bool(
             self._feet.standing.all()
-            and np.abs(dq).max() < 0.02 + 5.0 * self._noise.velocity
-            and np.abs(gyro - self._filter.gyro_bias).max()
-            < 0.02 + 5.0 * self._noise.gyro + 3.0 * math.sqrt(self._filter.covariance[9, 9])
+            and np.abs(dq).max() < 0.02 + 5.0 * noise.velocity
+            and np.abs(gyro - body.gyro_bias).max() < turning
         )
-        if not still or self._rests.count == 0:
-            self._rests.since, self._rests.total, self._rests.count = time, np.zeros(3), 0
+        if not still or rests.count == 0:
+            rests.since, rests.total, rests.count = time, np.zeros(3), 0
         if still:
-            self._rests.total, self._rests.count = self._rests.total + gyro, self._rests.count + 1
-            if time - self._rests.since >= REST_TIME:
-                noise = math.hypot(self._noise.gyro / math.sqrt(self._rests.count), BIAS_FLOOR)
-                self._filter.rest(self._rests.total / self._rests.count, noise)
-                self._rests.count = 0
+            rests.total, rests.count = rests.total + gyro, rests.count + 1
+            if time - rests.since >= REST_TIME:
+                mean = rests.total / rests.count
+                body.rest(mean, math.hypot(noise.gyro / math.sqrt(rests.count), BIAS_FLOOR))
+                rests.count = 0
 
     def _estimate(
         self,
@@ -611,18 +606,9 @@ class BodyEstimator:
         centres = places + body.position
         loads = np.zeros_like(places) if forces is None else forces @ turn.T
         slips = self._window.velocity[:, :2]
-        feet = tuple(
-            map(
-                FootMotion,
-                centres,
-                velocities,
-                loads,
-                self._feet.standing.tolist(),
-                slips,
-                deviations.tolist(),
-                (self._feet.standing & self._feet.left_out).tolist(),
-            )
-        )
+        stands, left_out = self._feet.standing, self._feet.standing & self._feet.left_out
+        flags = stands.tolist(), slips, deviations.tolist(), left_out.tolist()
+        feet = tuple(map(FootMotion, centres, velocities, loads, *flags))
         velocity = body.velocity + turn @ cross(rate, self._body.to_imu[:3, 3])
         # From the filter's errors to those of the base: rotation moves it about the IMU.
         step = self._body.errors

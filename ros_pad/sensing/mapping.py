@@ -367,28 +367,12 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
     if 'joints' not in part and 'feet' not in part:
         return None, ()
     known = list(robot.joint_names)
-    signs, offsets = np.ones(len(known)), np.zeros(len(known))
     with part.table('joints' if 'joints' in part else 'feet') as row:
-        names, wanted = None, known
-        if 'joints' not in part:
-            offsets, order = _feet(row, robot, made_for)
+        if 'joints' in part:
+            names, wanted, signs, offsets = _named(row, known, made_for)
         else:
-            if ('names' in row) == ('order' in row):
-                raise ConfigError(f'{row.origin}: either names or order is needed')
-            if 'names' in row:
-                names, order = _reader(row.text('names'), row.origin), ()
-            else:
-                order = row.sequence('order')
-            with row.table('rename', default={}) as words:
-                renamed = {_place(words, name, known): words.text(name) for name in words.keys}
-            wanted = [renamed.get(place, name) for place, name in enumerate(known)]
-            for name in row.sequence('reversed', ()):
-                signs[_place(row, name, known)] = -1.0
-            with row.table('offsets', default={}) as values:
-                for name in values.keys:
-                    offsets[_place(values, name, known)] = values.number(
-                        name, 'rad', -100.0, 100.0
-                    )
+            offsets, order = _feet(row, robot, made_for)
+            names, wanted, signs = lambda _: order, known, np.ones(len(known))
         scale = row.number('scale', '', 1e-9, 1e9, default=1.0)
         scales = {'positions': scale, 'velocities': scale, 'efforts': _scale(row, 'effort_scale')}
         fields = {
@@ -396,16 +380,10 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
             for kind in scales
             if kind == 'positions' or kind in row
         }
-        if order:
-            try:
-                _places(wanted, order)
-            except InvalidInput as error:
-                hint = f'; this mapping is made for the robot {made_for}' if made_for else ''
-                raise ConfigError(f'{row.origin}: order: {error}{hint}') from None
     last: dict[tuple[str, ...], Array] = {}  # places by the last names
 
     def read(message: Any) -> dict[str, Array | None]:
-        given = tuple(map(str, names(message))) if names else tuple(order)
+        given = tuple(map(str, names(message)))
         if given not in last:
             places = _places(wanted, given)
             last.clear()
@@ -425,6 +403,32 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
         return found
 
     return read, tuple(fields)
+
+
+def _named(
+    row: Table, known: Sequence[str], made_for: str
+) -> tuple[_Read, list[str], Array, Array]:
+    """Read what gives the names in a message, and for each joint its name there, sign and zero."""
+    if ('names' in row) == ('order' in row):
+        raise ConfigError(f'{row.origin}: either names or order is needed')
+    signs, offsets = np.ones(len(known)), np.zeros(len(known))
+    with row.table('rename', default={}) as words:
+        renamed = {_place(words, name, known): words.text(name) for name in words.keys}
+    wanted = [renamed.get(place, name) for place, name in enumerate(known)]
+    for name in row.sequence('reversed', ()):
+        signs[_place(row, name, known)] = -1.0
+    with row.table('offsets', default={}) as values:
+        for name in values.keys:
+            offsets[_place(values, name, known)] = values.number(name, 'rad', -100.0, 100.0)
+    if 'names' in row:
+        return _reader(row.text('names'), row.origin), wanted, signs, offsets
+    order = row.sequence('order')
+    try:
+        _places(wanted, order)
+    except InvalidInput as error:
+        hint = f'; this mapping is made for the robot {made_for}' if made_for else ''
+        raise ConfigError(f'{row.origin}: order: {error}{hint}') from None
+    return lambda _: order, wanted, signs, offsets
 
 
 def _feet(row: Table, robot: Robot, made_for: str) -> tuple[Array, tuple[str, ...]]:

@@ -578,7 +578,12 @@ class SensingStage:
         self.samples += 1
         self.last_ns = stamp_ns
         self._since = _Since()
-        self._update_doubt(estimate.doubt)
+        doubt = estimate.doubt
+        if not self.force_source and self._source != 'efforts' and all(self._forces):
+            late_ns = max((kept[-1][0] - stamp_ns for kept in self._forces), key=abs)
+            doubt = f'force: stamps of the feet are {late_ns * 1e-6:.3g} ms after those of the'
+            doubt += ' joints, -20 to 1 ms is allowed'
+        self._update_doubt(doubt)
         self._out.estimate(stamp_ns, estimate)
 
     def _update_doubt(self, doubt: str) -> None:

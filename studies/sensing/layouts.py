@@ -98,7 +98,7 @@ def joint_states(log: Log, names: Sequence[str]) -> Iterator[tuple[str, str, Any
 def wrenches(log: Log, robot: Robot) -> Iterator[tuple[str, str, Any, int]]:
     """Yield geometry_msgs/WrenchStamped of each foot, in the axes of its link."""
     for tick, stamp in enumerate(stamps(log)):
-        turns = robot.foot_rotations(log.joint_positions[tick])
+        turns = robot.kinematics(log.joint_positions[tick]).rotations
         forces = (turns.transpose(0, 2, 1) @ log.foot_forces[tick][..., None])[..., 0]
         for leg, force in enumerate(forces, 1):
             message = blank('geometry_msgs/msg/WrenchStamped', stamp)

@@ -107,7 +107,7 @@ def icub(folder: pathlib.Path) -> Recording:
     time, q, dq, gyro, force, left, right, position, angles = fields.values()
     robot = two_legs(_found(folder, 'model.urdf', 'icub'))
     q, dq = q[:, _ICUB_JOINTS], dq[:, _ICUB_JOINTS]
-    normals = np.array([robot.foot_rotations(row)[:, :, 2] for row in q])
+    normals = np.array([robot.kinematics(row).rotations[:, :, 2] for row in q])
     rate = (len(time) - 1) / float(time[-1, 0] - time[0, 0])
     # Deviations of gyro, accelerometer and encoders are those of the authors' filters.
     noise = Noise(0.01, 0.09, np.deg2rad(0.1), 0.1, 2.0, accelerometer_bias=0.05)
@@ -131,7 +131,6 @@ def two_legs(path: pathlib.Path) -> Robot:
         foot_radius=0.0,  # soles on ankles
         imu=file.pose('root_link_imu_frame'),
         chains=Chains(legs, feet),
-        hips=np.array([joints[0].at[:3, 3] for joints in legs]),
         home=np.zeros((2, len(_LEG))),
         gait=None,
         servo=None,

@@ -33,10 +33,12 @@ def test_kinematics_are_those_that_pinocchio_gave():
     for leg, foot in enumerate(FEET):
         row = figures[foot]
         assert robot.foot_positions(Q)[leg] == pytest.approx(np.array(row['position']), abs=1e-12)
-        assert robot.foot_rotations(Q)[leg] == pytest.approx(np.array(row['rotation']), abs=1e-12)
+        assert robot.kinematics(Q).rotations[leg] == pytest.approx(
+            np.array(row['rotation']), abs=1e-12
+        )
         lines = np.array(row['jacobian'])
         assert robot.foot_jacobians(Q)[leg] == pytest.approx(lines[:3], abs=1e-12)
-        assert robot.angular_jacobians(Q)[leg] == pytest.approx(lines[3:], abs=1e-12)
+        assert robot.kinematics(Q).angular[leg] == pytest.approx(lines[3:], abs=1e-12)
     torques = robot.gravity_torques(Q, GRAVITY)
     assert torques == pytest.approx(np.array(figures['torques']), abs=1e-12)
     assert robot.imu == pytest.approx(np.array(figures['imu']), abs=1e-12)
@@ -56,10 +58,12 @@ def test_jacobians_are_derivatives_of_places_and_rotations(name, seed):
         behind[:, joint] -= step
         line = (robot.foot_positions(ahead) - robot.foot_positions(behind)) / (2 * step)
         assert robot.foot_jacobians(q)[:, :, joint] == pytest.approx(line, abs=1e-8)
-        turn = robot.foot_rotations(ahead) @ robot.foot_rotations(behind).transpose(0, 2, 1)
+        turn = robot.kinematics(ahead).rotations @ robot.kinematics(behind).rotations.transpose(
+            0, 2, 1
+        )
         twice = turn - turn.transpose(0, 2, 1)
         rate = np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1) / (4 * step)
-        assert robot.angular_jacobians(q)[:, :, joint] == pytest.approx(rate, abs=1e-8)
+        assert robot.kinematics(q).angular[:, :, joint] == pytest.approx(rate, abs=1e-8)
 
 
 def test_the_hexapod_is_that_of_the_scenes():

@@ -140,7 +140,7 @@ def test_rolling_feet_take_the_body_along():
             def rates(q, speed):
                 # J q' = r (w x n) - v with w = Jw q' and n = z, of a ball of 0.022 m.
                 turn = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-                lines = POINTED.foot_jacobians(q) - 0.022 * turn @ POINTED.angular_jacobians(q)
+                lines = POINTED.foot_jacobians(q) - 0.022 * turn @ POINTED.kinematics(q).angular
                 return np.linalg.solve(lines, np.tile(-speed, (4, 1))[..., None])[..., 0]
 
             half = motion.q + 0.5 * DT * rates(motion.q, mean)
@@ -210,7 +210,7 @@ def test_forces_from_torques_and_in_the_axes_of_the_feet():
     torques = torques - (POINTED.foot_jacobians(q)[:, 2] * STANDING[0, 2])
     readings = (np.zeros(3), UP, q, 0.0 * q)
     found = BodyEstimator(POINTED).update(0.0, *readings, efforts=torques.ravel())
-    turned = (POINTED.foot_rotations(q).transpose(0, 2, 1) @ STANDING[..., None])[..., 0]
+    turned = (POINTED.kinematics(q).rotations.transpose(0, 2, 1) @ STANDING[..., None])[..., 0]
     other = BodyEstimator(POINTED, force_axes='foot').update(0.0, *readings, turned)
     for estimate, near in ((found, 1.0), (other, 1e-6)):
         for foot, force in zip(estimate.feet, STANDING, strict=True):

@@ -194,6 +194,17 @@ def test_forces_are_awaited_until_the_next_joints_then_the_last_ones_count():
         watched.joints(ms)
     assert watched.times[-1] == 36
     assert watched.used[-1][5] is None  # older than 20 ms
+    assert watched.stage.doubt.startswith('force: stamps of the feet are -32 ms after')
+
+
+def test_forces_of_another_clock_are_named():
+    watched = Watched()
+    for ms in range(4, 400, 4):
+        watched.forces(ms + 1000)
+        watched.imu(ms)
+        watched.joints(ms)
+    assert watched.used[-1][5] is None
+    assert watched.stage.doubt.startswith('force: stamps of the feet are 1e+03 ms after')
 
 
 def test_forces_of_a_later_moment_wait_for_it():

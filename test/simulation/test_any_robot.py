@@ -156,7 +156,7 @@ def test_forces_are_in_the_axes_of_links_of_feet_that_are_turned(tmp_path):
     scene = Scene.load(path)
     robot, _ = walk(scene, 'L2', cycles=0)  # it stands
     felt = robot.proprioception()
-    turn = scene.body.robot.foot_rotations(felt.positions)[0]
+    turn = scene.body.robot.kinematics(felt.positions).rotations[0]
     assert turn @ felt.forces[0] == pytest.approx(robot.feet[0].force, abs=0.05)
 
 
