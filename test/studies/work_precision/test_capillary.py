@@ -33,7 +33,7 @@ def rows():
 
 @pytest.fixture(scope='module')
 def results(rows):
-    found = [row for row in rows if isinstance(row, capillary.Result)]
+    found = [row for row in rows if row.kind == 'result']
     return {(result.shape, result.family): result for result in found}  # the finest mesh of each
 
 
