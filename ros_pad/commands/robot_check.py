@@ -148,7 +148,7 @@ def _live(
 ) -> tuple[list[tuple[str, Any, int]], dict[str, str]]:
     """Return messages that arrive, and the types of all topics."""
     try:
-        from ros_pad.nodes.listening import receive
+        from ros_pad.nodes.intake import receive
     except ImportError as error:
         raise ConfigError(
             f'live topics need ROS 2 ({error}): source its setup.bash, or'

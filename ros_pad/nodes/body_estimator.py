@@ -170,7 +170,7 @@ class BodyEstimatorNode(PadNode):
         if not publish_tf:
             return
         kind = message_class('tf2_msgs/msg/TFMessage')
-        publisher = self.create_publisher(kind, '/tf', qos.SENSOR_PUBLISH)
+        publisher = self.create_publisher(kind, '/tf', qos.RELIABLE)
 
         def send(stamp_ns: int, estimate: BodyEstimate) -> None:
             transform = TransformStamped(child_frame_id=base)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The walk as markers, for RViz and Foxglove: soles, forces, body, path, wet ground."""
+"""The walk as markers, for RViz and Foxglove: soles, forces, wet ground."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.pace import Pace
 from ros_pad.records import split
 from ros_pad.simulation.robot import FootState, SimulatedRobot
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
 ARRAY = message_type('visualization_msgs/msg/MarkerArray')
@@ -33,8 +33,7 @@ CELL = 0.05
 """Edge of a square of floor that is drawn wet or dry, m."""
 
 _SIGHT, _BREADTH = 1.5, 0.6  # floor is shown so far ahead of and behind the body, and beside it, m
-_SLOW_NS = 1_000_000_000  # floor and path are large messages: once a second is enough
-_PATH_STEP = 0.02  # smallest distance between points of the path, m
+_SLOW_NS = 1_000_000_000  # floor is a large message: once a second is enough
 
 # Okabe and Ito's colours, as in reports.
 _WET = (0.337, 0.706, 0.914)
@@ -63,14 +62,7 @@ class WalkMarkers:
     def __init__(self, scene: Scene, floor: Floor) -> None:
         self._scene = scene
         self._floor = floor
-        self._path: list[Any] = []
         self._slow_pace = Pace(_SLOW_NS)
-        outline: Sequence[tuple[float, float]] = ()
-        if isinstance(scene.body, LeggedBody):
-            around = sorted(scene.body.homes, key=lambda home: math.atan2(home[1], -home[0]))
-            outline = (*around, around[0])
-        # The outline of the body is drawn halfway to the home positions of the feet.
-        self._outline = [(0.5 * x, 0.5 * y) for x, y in outline]
 
     def message(self, robot: SimulatedRobot, pressures: Sequence[float], time_ns: int) -> Any:
         """Return the markers of this moment.
@@ -90,13 +82,8 @@ class WalkMarkers:
         for leg, foot, pressure in zip(robot.legs, robot.feet, pressures, strict=True):
             array.markers.append(self._sole(leg, foot, pressure))
             array.markers.append(self._force(leg, foot))
-        x, y, heading = robot.body
-        array.markers.append(self._body(x, y, heading))
-        if not self._path or math.dist((self._path[-1].x, self._path[-1].y), (x, y)) > _PATH_STEP:
-            self._path.append(Point(x=x, y=y, z=0.002))
         if self._slow_pace.due(time_ns):
-            array.markers.append(self._line('path', self._path, _BLACK, 0.006))
-            array.markers.append(self._ground(x, y))
+            array.markers.append(self._ground(*robot.body[:2]))
         for marker in array.markers:
             marker.header.stamp = stamp
         return array
@@ -123,28 +110,6 @@ class WalkMarkers:
         marker.points = [Point(x=x, y=y, z=z), Point(x=x + fx, y=y + fy, z=z + fz)]
         marker.scale = Vector3(x=0.006, y=0.012, z=0.015)  # shaft, head, length of head
         marker.color = _colour(_SLIPPING if foot.slip_speed > 0.005 else _BLACK)
-        return marker
-
-    def _body(self, x: float, y: float, heading: float) -> Any:
-        cosine, sine = math.cos(heading), math.sin(heading)
-        corners = [
-            Point(
-                x=x + cosine * fore - sine * left,
-                y=y + sine * fore + cosine * left,
-                z=self._scene.body.height if isinstance(self._scene.body, LeggedBody) else 0.05,
-            )
-            for fore, left in self._outline or ((-0.05, 0.0), (0.05, 0.0))
-        ]
-        return self._line('body', corners, _BLACK, 0.008)
-
-    def _line(
-        self, name: str, points: list[Any], colour: tuple[float, float, float], width: float
-    ) -> Any:
-        marker = _marker(name, 0, _MARKER.LINE_STRIP)
-        # RViz warns about a line of one point.
-        marker.points = points if len(points) > 1 else points * 2
-        marker.scale = Vector3(x=width, y=0.0, z=0.0)
-        marker.color = _colour(colour)
         return marker
 
     def _ground(self, x: float, y: float) -> Any:

@@ -23,17 +23,15 @@ _BEST_EFFORT, _RELIABLE = ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIA
 SENSOR = QoSProfile(depth=10, reliability=_BEST_EFFORT)
 """Subscribe to measurements: only recent ones are kept, and any driver's publisher matches."""
 
-SENSOR_PUBLISH = QoSProfile(depth=10, reliability=_RELIABLE)
-"""Publish measurements and estimates: reliable and best-effort subscribers both match."""
-
 RECORDS = QoSProfile(depth=100, reliability=_BEST_EFFORT)
 """Subscribe to records: a node that pauses for some tenths of a second loses none."""
 
-COMMAND = QoSProfile(depth=1, reliability=_RELIABLE)
-"""Publish set-points of a leg, or subscribe: only the newest is kept, and it must arrive."""
+NEWEST = QoSProfile(depth=1, reliability=_RELIABLE)
+"""Set-points of a leg, and publishers of ``/clock``: only the newest must arrive."""
 
-COMMANDS = QoSProfile(depth=10, reliability=_RELIABLE)
-"""Commands: one may lack the legs of the one before it."""
+RELIABLE = QoSProfile(depth=10, reliability=_RELIABLE)
+"""Commands, of which one may lack the legs of the one before it, ``/diagnostics``, and publishers
+of measurements and estimates: reliable and best-effort subscribers both match."""
 
 STATE = QoSProfile(
     depth=1, reliability=_RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
@@ -42,12 +40,6 @@ STATE = QoSProfile(
 
 CLOCK = QoSProfile(depth=1, reliability=_BEST_EFFORT)
 """Subscribe to ``/clock``, as rclpy itself does."""
-
-CLOCK_PUBLISH = QoSProfile(depth=1, reliability=_RELIABLE)
-"""Publish ``/clock``."""
-
-DIAGNOSTICS = QoSProfile(depth=10, reliability=_RELIABLE)
-"""``/diagnostics``, as diagnostic_updater publishes it."""
 
 
 class Profiles(NamedTuple):
@@ -62,10 +54,10 @@ class Profiles(NamedTuple):
 
 
 _OF = {
-    topics.COMMAND.pattern: Profiles(COMMANDS, COMMANDS),
-    topics.LEG_SETPOINT.pattern: Profiles(COMMAND, COMMAND),
-    topics.CLOCK.pattern: Profiles(CLOCK_PUBLISH, CLOCK),
-    topics.DIAGNOSTICS.pattern: Profiles(DIAGNOSTICS, DIAGNOSTICS),
+    topics.COMMAND.pattern: Profiles(RELIABLE, RELIABLE),
+    topics.LEG_SETPOINT.pattern: Profiles(NEWEST, NEWEST),
+    topics.CLOCK.pattern: Profiles(NEWEST, CLOCK),
+    topics.DIAGNOSTICS.pattern: Profiles(RELIABLE, RELIABLE),
 }
 
 
@@ -73,7 +65,7 @@ def profiles(topic: Topic) -> Profiles:
     """Return the QoS of a topic."""
     if topic.text:
         return Profiles(STATE, STATE)
-    measured = Profiles(SENSOR_PUBLISH, RECORDS if topic in topics.RECORDS else SENSOR)
+    measured = Profiles(RELIABLE, RECORDS if topic in topics.RECORDS else SENSOR)
     return _OF.get(topic.pattern, measured)
 
 

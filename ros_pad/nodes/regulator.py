@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
@@ -306,24 +305,20 @@ class RegulatorNode(PadNode, LifecycleNode):
         refused = any(each.answers.due for each in channels)
         if not (self.due(now_ns, problems) or refused):
             return
-        statuses = [
-            self._health(
-                f'leg {channel.leg} regulator',
-                str(channel.leg),
-                channel.answers.report(health),
-                channel.figures(),
-            )
-            for channel, health in zip(channels, found, strict=True)
+        parts: list[tuple[str, object, Health, Mapping[str, object]]] = [
+            (f'leg {each.leg} regulator', each.leg, each.answers.report(health), each.figures())
+            for each, health in zip(channels, found, strict=True)
         ]
         if channels:
-            statuses.append(self._health('supply', 'supply', supply, {}))
-        self.report(now_ns, statuses)
-
-    def _health(
-        self, name: str, part: str, health: Health, figures: Mapping[str, object]
-    ) -> DiagnosticStatus:
-        level, part = bytes([health.level]), f'{self.values["backend"]} {part}'
-        return self.status(name, level, health.message, figures, part)
+            parts.append(('supply', 'supply', supply, {}))
+        backend = self.values['backend']
+        self.report(
+            now_ns,
+            [
+                self.status(name, bytes([level]), message, figures, f'{backend} {part}')
+                for name, part, (level, message), figures in parts
+            ],
+        )
 
 
 def _settings(values: Mapping[str, Any]) -> SupervisorSettings:

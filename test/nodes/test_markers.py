@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 import itertools
-import math
 
 import pytest
 from rclpy.serialization import deserialize_message
@@ -63,15 +62,7 @@ def test_wet_ground_is_drawn_where_it_is_wet_and_nowhere_else():
         assert ((column, row) in drawn_at) == wet
 
 
-def test_floor_and_path_come_once_a_second_and_the_path_grows():
-    times, lengths = [], []
-    for _, _, robot, drawn in walked('hexapod_smooth_dry_flat', 4.0):
-        if ('path', 0) in drawn:
-            times.append(robot.time)
-            points = drawn['path', 0].points
-            lengths.append(points[-1].x - points[0].x)
-            gaps = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in itertools.pairwise(points)]
-            assert all(gap == 0.0 or gap > 0.015 for gap in gaps)
+def test_floor_comes_once_a_second():
+    walk = walked('hexapod_smooth_dry_flat', 4.0)
+    times = [robot.time for _, _, robot, drawn in walk if ('wet ground', 0) in drawn]
     assert times == pytest.approx([DT, 1.004, 2.004, 3.004])
-    assert lengths == sorted(lengths)
-    assert lengths[-1] > 0.2
