@@ -48,7 +48,7 @@ def start(name, *parameters):
 
 
 class Observer:
-    """Records arrival times of the records of each topic, and the last one."""
+    """Records arrival times and stamps of the records of each topic, and the last one."""
 
     def __init__(self):
         self._context = rclpy.Context()
@@ -68,7 +68,8 @@ class Observer:
 
         def callback(data):
             self.last[name] = block = decode(data)
-            times.extend([time.monotonic()] * len(block.stamps))
+            now = time.monotonic()
+            times.extend((now, stamp) for stamp in block.stamps.tolist())
 
         qos.subscription(self.node, topic, callback, raw=True)
 
@@ -80,15 +81,22 @@ class Observer:
             self._executor.spin_once(timeout_sec=0.05)
 
     def measure(self, seconds, result):
-        """Receive for a time, s; store rate, Hz, and longest gap, s, of each topic."""
+        """Receive for a time, s; store rate, Hz, and longest gap, s, of each topic.
+
+        The rate is that of the stamps: what was under way at the beginning does not count.
+        """
         begin = time.monotonic()
         end = begin + seconds
         while time.monotonic() < end:
             self._executor.spin_once(timeout_sec=0.05)
         for name, times in self.times.items():
-            counted = [at for at in times if begin <= at < end]
-            result.rates[name] = len(counted) / seconds
-            gaps = [b - a for a, b in itertools.pairwise([begin, *counted, end])]
+            counted = [(at, stamp) for at, stamp in times if begin <= at < end]
+            stamps = [stamp for _, stamp in counted]
+            result.rates[name] = 0.0
+            if len(stamps) > 1:
+                result.rates[name] = 1e9 * (len(stamps) - 1) / (stamps[-1] - stamps[0])
+            arrived = [begin, *(at for at, _ in counted), end]
+            gaps = [b - a for a, b in itertools.pairwise(arrived)]
             result.longest[name] = max(gaps)
 
     @property
