@@ -13,7 +13,6 @@ unobservable, as it is.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,37 +27,10 @@ GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
 # degrees of freedom.
 GATE = 16.27
 
-# Deviation of an acceleration between two samples over its jump from one to the other: impacts
-# are shorter than a sample.
-JUMP = 0.2
-
-# Random motion of a foot that stands, m after 1 s, growing with the root of time.
-STRAY = 3e-4
-
-# Random sinking and rising of a foot that stands, m after 1 s, as its load changes.
-SINKING = 6e-3
-
-# Relative error of the speed of rolling: feet are no spheres, and sink in.
-ROLLING_ERROR = 0.15
-
-# Time for which that error stays the same, s.
-ROLLING_TIME = 0.008
-
-# Speed, m/s, above which the filter has diverged.
-FASTEST = 100.0
-
 _APART = 1e2  # m²: variance of a measurement that must not count
 _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 _GYRO, _FORCE = slice(9, 12), slice(12, 15)
 RADIUS, SCALE, FEET = 15, 16, 17
-
-
-class _Given(NamedTuple):
-    """Deviations of a sample of gyro, rad/s, and accelerometer, m/s²; the gate of feet."""
-
-    gyro: float
-    force: float
-    gate: float
 
 
 class BodyFilter:
@@ -89,10 +61,6 @@ class BodyFilter:
         Of the errors above.
     creep : float
         Random motion of feet that stand, beyond that on firm ground, m after 1 s.
-    rejected : array of bool (legs,)
-        Feet whose last measurement was not consistent with standing still.
-    lifted : array of bool (legs,)
-        Of these, the ones whose height was not either.
     """
 
     def __init__(
@@ -109,8 +77,7 @@ class BodyFilter:
         self.footholds = np.zeros((legs, 3))
         self.radius = self.scale = self.creep = 0.0
         self.covariance = np.zeros((size, size))
-        self.rejected, self.lifted = np.zeros((2, legs), dtype=bool)
-        self._given = _Given(gyro_noise, accelerometer_noise, gate)
+        self._noise, self._gate = (gyro_noise, accelerometer_noise), gate
         # What errors, and errors of gyro and accelerometer, do in a step.
         self._step = np.eye(size), np.zeros((size, 6))
         self._last: tuple[Array, Array] | None = None
@@ -126,11 +93,12 @@ class BodyFilter:
     ) -> None:
         """Set standard deviations in SI units, without correlations; of ``turn``, only tilt."""
         self.covariance[:] = 0.0
-        _diagonal(self.covariance)[0:2] = turn**2
-        _diagonal(self.covariance)[_SPEED] = velocity**2
-        _diagonal(self.covariance)[_GYRO] = gyro_bias**2
-        _diagonal(self.covariance)[_FORCE] = force_bias**2
-        _diagonal(self.covariance)[RADIUS], _diagonal(self.covariance)[SCALE] = radius**2, scale**2
+        variances = _diagonal(self.covariance)
+        variances[0:2] = turn**2
+        variances[_SPEED] = velocity**2
+        variances[_GYRO] = gyro_bias**2
+        variances[_FORCE] = force_bias**2
+        variances[RADIUS:FEET] = radius**2, scale**2
         self._last = None
 
     @property
@@ -144,10 +112,7 @@ class BodyFilter:
         self.covariance[RADIUS:FEET] = 0.0
         self.covariance[:, RADIUS:FEET] = 0.0
         self.radius, self.scale = radius, scale
-        _diagonal(self.covariance)[RADIUS], _diagonal(self.covariance)[SCALE] = (
-            radius_sd**2,
-            scale_sd**2,
-        )
+        _diagonal(self.covariance)[RADIUS:FEET] = radius_sd**2, scale_sd**2
 
     def lose(self, turn: float = 0.01, velocity: float = 1.0) -> None:
         """Let rotation and velocity be less known, by so much, rad and m/s, as after a gap."""
@@ -198,15 +163,19 @@ class BodyFilter:
         step[_PLACE, _SPEED] = dt * _UNIT
         step[FEET:].reshape(-1, 3, step.shape[1])[..., _SPEED] = -dt * _UNIT
         step[FEET:, RADIUS] = dt * spin.ravel()
-        gyro, force, _ = self._given
-        noise = np.array((gyro, math.sqrt(force**2 + JUMP**2 * jump)))[_SIX] * inputs
+        # Impacts are shorter than a sample: an acceleration may be off by a fifth of its jump.
+        gyro, force = self._noise[0], math.sqrt(self._noise[1] ** 2 + 0.2**2 * jump)
+        noise = np.array(3 * [gyro] + 3 * [force]) * inputs
         self.covariance[:] = step @ self.covariance @ step.T + noise @ noise.T
-        _diagonal(self.covariance)[_GYRO] += GYRO_DRIFT**2 * dt
-        _diagonal(self.covariance)[_FORCE] += FORCE_DRIFT**2 * dt
-        unsure = ROLLING_ERROR * self.radius
-        stray = (STRAY**2 + self.creep**2 + ROLLING_TIME * unsure**2 * (spin * spin).sum(1)) * dt
-        _diagonal(self.covariance)[FEET:].reshape(-1, 3)[:] += stray[:, None]
-        _diagonal(self.covariance)[FEET + 2 :: 3] += SINKING**2 * dt
+        variances = _diagonal(self.covariance)
+        variances[_GYRO] += 2e-5**2 * dt  # drift of the biases after 1 s, rad/s and m/s²
+        variances[_FORCE] += 1e-3**2 * dt
+        # Feet are no spheres, and sink in: their speed of rolling is 15 % off for 8 ms.
+        unsure = 0.15 * self.radius
+        # On firm ground a foot strays by 0.3 mm in the first second, and rises and sinks by 6 mm.
+        stray = (3e-4**2 + self.creep**2 + 0.008 * unsure**2 * (spin * spin).sum(1)) * dt
+        variances[FEET:].reshape(-1, 3)[:] += stray[:, None]
+        variances[FEET + 2 :: 3] += 6e-3**2 * dt
 
     def set_down(
         self, feet: Flags, places: Array, hips: Array, noise: Array, level: bool = False
@@ -248,8 +217,8 @@ class BodyFilter:
         standing: Flags,
         slipping: Flags,
         fixed: bool,
-    ) -> None:
-        """Correct everything with feet that stand; `rejected` are those that do not stick.
+    ) -> Flags:
+        """Correct everything with feet that stand.
 
         Parameters
         ----------
@@ -262,6 +231,12 @@ class BodyFilter:
         fixed : bool
             Whether radius and length of legs are kept: nothing can be learnt about legs at rest,
             but noise would look like it.
+
+        Returns
+        -------
+        array of bool (2, legs)
+            Feet whose measurement is not consistent with standing still, and of these the ones
+            whose height is not either.
         """
         miss = np.where(standing[:, None], places - self.footholds, 0.0)
         # Not from the measured places: their noise would look like legs of another length.
@@ -275,12 +250,12 @@ class BodyFilter:
         diagonal = spread.ravel()[:: 3 * count + 1].reshape(count, 3)
         diagonal[~standing] += _APART
         diagonal[slipping, :2] += _APART
-        self.rejected[:] = self.lifted[:] = False
+        judged = np.zeros((2, count), dtype=bool)
         miss = miss.ravel()
         root, _ = dpotrf(spread, lower=1)
         score, _ = dtrtrs(root, miss, lower=1)
-        if score @ score > self._given.gate:
-            root = self._judge(spread, diagonal, miss, standing, slipping)
+        if score @ score > self._gate:
+            root = self._judge(spread, diagonal, miss, slipping, judged)
         # Not dtrtrs for many columns: OpenBLAS wakes threads for it, for 100 µs or ms.
         inverse, _ = dtrtri(root, lower=1)
         rows = inverse @ seen
@@ -294,11 +269,12 @@ class BodyFilter:
         self.apply(error)
         spread += spread.T.copy()  # rounding must not make it unsymmetric
         spread *= 0.5
+        return judged
 
     def _judge(
-        self, spread: Array, diagonal: Array, miss: Array, standing: Flags, slipping: Flags
+        self, spread: Array, diagonal: Array, miss: Array, slipping: Flags, judged: Flags
     ) -> Array:
-        """Reject feet one by one, judged in order of consistency; return the root of the rest."""
+        """Reject feet one by one, in order of consistency; return the root of the rest."""
         legs = len(self.footholds)
         each = np.arange(legs)
         own = spread.reshape(legs, 3, legs, 3)[each, :, each]
@@ -306,20 +282,21 @@ class BodyFilter:
         alone = (rows * np.linalg.solve(own, rows[..., None])[..., 0]).sum(1)
         order = np.arange(3 * legs).reshape(legs, 3)[np.argsort(alone)]
         weak = slipping.copy()
+        rejected, lifted = judged
         for _ in range(2 * legs):
             chosen = order.ravel()
             root, _ = dpotrf(spread[np.ix_(chosen, chosen)], lower=1)
             score, _ = dtrtrs(root, miss[chosen], lower=1)
-            bad = np.flatnonzero((score.reshape(legs, 3) ** 2).sum(1) > self._given.gate)
+            bad = np.flatnonzero((score.reshape(legs, 3) ** 2).sum(1) > self._gate)
             if not bad.size:
                 break
             foot = int(order[bad[0], 0]) // 3
             if weak[foot]:
                 diagonal[foot] += _APART
-                self.lifted[foot] = True
+                lifted[foot] = True
             else:
                 diagonal[foot, :2] += _APART
-            weak[foot] = self.rejected[foot] = True
+            weak[foot] = rejected[foot] = True
         root, _ = dpotrf(spread, lower=1)
         return root
 
@@ -333,11 +310,9 @@ class BodyFilter:
     def sound(self) -> bool:
         """Return whether velocity and covariance are such as a robot can have."""
         speed = float(self.velocity @ self.velocity)
-        least, most = (
-            float(_diagonal(self.covariance).min()),
-            float(_diagonal(self.covariance).max()),
-        )
-        return speed < FASTEST**2 and least > -1e-9 and most < math.inf  # false for NaN, too
+        variances = _diagonal(self.covariance)
+        fine = speed < 100.0**2 and variances.min() > -1e-9 and variances.max() < math.inf
+        return bool(fine)  # false for NaN, too
 
     def apply(self, error: Array) -> None:
         """Correct the state by an estimated error, (17 + 3 legs,)."""
@@ -352,14 +327,7 @@ class BodyFilter:
         self.turn = rotation(turn) @ self.turn
 
 
-# Random walk of the bias of the gyro, rad/s after 1 s.
-GYRO_DRIFT = 2e-5
-
-# Random walk of the bias of the accelerometer, m/s² after 1 s.
-FORCE_DRIFT = 1e-3
-
 _UNIT = np.eye(3)
-_SIX = np.array((0, 0, 0, 1, 1, 1))
 _FALL = skew(GRAVITY)
 
 

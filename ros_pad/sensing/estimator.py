@@ -42,65 +42,10 @@ LONGEST_GAP = 0.2
 # gap leaves one.
 RECOVERY = 0.3
 
-# Time for which all feet may slip before the velocity is taken to be wrong, s, if they slip
-# alike.
-LOST = 2.0
-
-# Largest difference of slip velocities that are alike, m/s.
-ALIKE = 0.03
-
-# Time for which a slipping foot has to be slow before it counts as sticking, s.
-STICKS = 0.03
-
-# The same for a foot that has just landed, s: it skids first.
-SETTLES = 0.012
-
-# Standard deviations of the slip speed up to which a foot is slow.
-SLOW = 2.5
-
-# Standard deviations of the slip speed from which on a foot slips.
-FAST = 4.0
-
-# Time over which the gyro is averaged when the body is at rest, s.
-REST_TIME = 0.2
-
-# Deviation of such a mean from the bias of the gyro, rad/s: nothing is quite at rest.
-BIAS_FLOOR = 3e-4
-
 # Deviation of the rotation after a time without readings of the IMU, rad.
 BLIND_TURN = 0.1
 
-# Deviations of angular velocity, rad/s, and acceleration, m/s², of a body between samples that
-# are far apart.
-BLIND_RATE, BLIND_ACCELERATION = 0.5, 4.0
-
-# Slip speed up to which feet show a delay, m/s.
-CALM = 0.05
-
-# Random motion of feet that stand, m after 1 s, over the share of slips beyond SLIPPERY.
-CREEP = 0.03
-
-# Time between two looks at the length of the legs, s.
-LOOK = 0.25
-
-# Relative error of the length of the legs above which that of the robot's file is wrong.
-WRONG_LENGTH = 0.06
-
-# Share of its variance that walking must have taken away before.
-LEARNT = 0.05
-
-# Its deviation from then on.
-UNKNOWN_LENGTH = 0.05
-
-# Its deviation below which it is known again.
-KNOWN_LENGTH = 0.012
-
-# Factor on the variance of a mean of slip velocities, as they vary in their window: neighbours
-# are not independent.
-UNSTEADY = 1.5
-
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
-FOOT_NOISE = 1e-4  # m: kinematics that are not quite right
 
 
 def forces_of(chains: Chains, kinematics: Kinematics, efforts: Array, gravity: Array) -> Array:
@@ -238,7 +183,7 @@ class BodyEstimator:
         )
         self._time = math.nan
         self._step = 0.0  # the last one, s
-        self._feet = Feet(legs, STICKS)
+        self._feet = Feet(legs)
         self._doubts = Doubts(RECOVERY)
         self._checks = Checks(
             Repeats(noise.gyro, noise.velocity),
@@ -386,7 +331,7 @@ class BodyEstimator:
             self._doubts.add(time, f'gap: no readings for {dt:.2g} s')
             self._filter.lose(BLIND_TURN)
         elif dt > LONGEST_STEP:
-            self._filter.lose(BLIND_RATE * dt, BLIND_ACCELERATION * dt)
+            self._filter.lose(0.5 * dt, 4.0 * dt)  # of a body that turns and speeds up, SI units
             if before > LONGEST_STEP:  # no foot keeps its foothold
                 self._doubts.add(
                     time,
@@ -421,14 +366,16 @@ class BodyEstimator:
         places, hips = self._placed(kinematics, turn)
         lines = turn @ kinematics.jacobians
         squares = lines @ lines.transpose(0, 2, 1)
-        noise = self._noise.encoder**2 * squares + FOOT_NOISE**2 * np.eye(3)
+        # Kinematics are not quite right.
+        noise = self._noise.encoder**2 * squares + 1e-4**2 * np.eye(3)
         body.set_down(lands, places, hips, noise)
+        judged = np.zeros((2, legs), dtype=bool)
         if self._feet.standing.any():
             fixed = not self._checks.legs.agree or bool(
                 np.abs(dq).max() < 0.02 + 5.0 * self._noise.velocity
             )
             trusted = self._feet.standing & ~self._checks.legs.against
-            body.stand(places, hips, noise, trusted, self._feet.left_out, fixed)
+            judged = body.stand(places, hips, noise, trusted, self._feet.left_out, fixed)
         if not body.sound():
             return self._anew(time, gyro, accelerometer, kinematics, dq, forces)
         self._rest(time, gyro, dq)
@@ -451,15 +398,15 @@ class BodyEstimator:
         white = window.lever_noise**2 * lever
         deviations = np.sqrt(white + common)
         latest = np.sqrt(window.latest_noise**2 * lever + common)
-        self._judge(time, window.velocity, deviations, latest, (places, hips, noise))
+        self._judge(time, judged, deviations, latest, (places, hips, noise))
         speeds = np.hypot(window.velocity[:, 0], window.velocity[:, 1])
-        self._checks.delay.update(
-            time, turn @ rate, places, slips, self._feet.standing & (speeds < CALM)
-        )
+        sticking = self._feet.standing & (speeds < 0.05)  # m/s
+        self._checks.delay.update(time, turn @ rate, places, slips, sticking)
         moves = np.hypot(moving[:, 0], moving[:, 1])
         if self._compare(time, dt, speeds, moves):
             body.set_down(self._feet.standing, places, hips, noise)
-        deviations = np.sqrt(np.maximum(white, UNSTEADY * window.unsteady) + common)
+        # Velocities that vary in their window are not independent of their neighbours.
+        deviations = np.sqrt(np.maximum(white, 1.5 * window.unsteady) + common)
         return self._estimate(time, rate, places, velocities, forces, deviations)
 
     def _placed(self, kinematics: Kinematics, turn: Array) -> tuple[Array, Array]:
@@ -491,14 +438,14 @@ class BodyEstimator:
         self._feet.left_out &= self._feet.standing
         if self._options.rejection:
             self._feet.left_out |= lands
-            self._feet.patience[lands] = SETTLES
+            self._feet.patience[lands] = 0.012  # it skids first
             self._feet.slow_since[lands] = math.inf
         return lands
 
     def _judge(
         self,
         time: float,
-        slips: Array,
+        judged: Flags,
         deviations: Array,
         latest: Array,
         feet: tuple[Array, Array, Array],
@@ -506,17 +453,16 @@ class BodyEstimator:
         """Update which feet slip: those that slip have a foothold only in height."""
         if not self._options.rejection:
             return
-        state = self._feet
+        state, slips, (rejected, lifted) = self._feet, self._window.velocity, judged
         speeds = np.hypot(slips[:, 0], slips[:, 1])
         fresh = state.standing & ~state.left_out
-        fresh &= self._filter.rejected | (speeds > FAST * deviations)
-        state.patience[fresh] = STICKS
+        fresh &= rejected | (speeds > 4.0 * deviations)
+        state.patience[fresh] = 0.03
         now = self._window.latest
-        slow = state.standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < SLOW * latest)
+        slow = state.standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < 2.5 * latest)
         state.slow_since = np.where(slow, np.minimum(state.slow_since, time), math.inf)
         state.left_out |= fresh
         state.left_out &= ~(time - state.slow_since >= state.patience)
-        lifted = self._filter.lifted
         if state.left_out.any():
             self._filter.set_down(state.left_out & ~lifted, *feet, level=True)
         if lifted.any():
@@ -526,16 +472,17 @@ class BodyEstimator:
             state.held = time
         if sticking.any() or not state.standing.any():
             state.sliding_since = time
-        elif time - state.sliding_since > LOST and state.standing.sum() > 1:
-            self._regain(time, slips[state.standing])
-
-    def _regain(self, time: float, slips: Array) -> None:
-        """Take feet to stick that all slip alike for long: more likely the velocity is wrong."""
-        if np.ptp(slips[:, :2], axis=0).max() < ALIKE:
+        elif (
+            time - state.sliding_since > 2.0
+            and state.standing.sum() > 1
+            and np.ptp(slips[state.standing, :2], axis=0).max() < 0.03  # m/s
+        ):
+            # All feet that slip alike for so long stick, and the velocity is wrong.
             self._filter.lose()
-            self._feet.left_out[:] = False
-            self._feet.held = self._feet.sliding_since = time
-            self._doubts.add(time, 'slipping: all feet slipped alike, velocity is estimated anew')
+            state.left_out[:] = False
+            state.held = state.sliding_since = time
+            text = 'slipping: all feet slipped alike, velocity is estimated anew'
+            self._doubts.add(time, text)
 
     def _compare(self, time: float, dt: float, slips: Array, moves: Array) -> bool:
         """Compare the legs with each other, and their length with that of the robot's file.
@@ -548,14 +495,14 @@ class BodyEstimator:
             # What such legs, or feet that were in the air, have shown is wrong.
             self._filter.reshape(self._robot.foot_radius, noise.radius, 0.0, noise.length)
             return True
-        self._filter.creep = CREEP * legs.slippery
+        self._filter.creep = 0.03 * legs.slippery  # m after 1 s
         # Joints that are late look like legs of another length, too.
         if time < self._length.look or self._checks.delay.doubt():
             return False
-        self._length.look = time + LOOK
+        self._length.look = time + 0.25
         scale, deviation = self._filter.scale, self._filter.deviations[1]
         if self._length.stretched:
-            if deviation > KNOWN_LENGTH:
+            if deviation > 0.012:
                 self._doubts.add(
                     time,
                     'kinematics: legs seem to be longer or shorter than in the file of the'
@@ -563,13 +510,14 @@ class BodyEstimator:
                 )
             return False
         learnt = noise.length**2 - deviation**2
-        # Feet that slip for most of their stances look like legs of another length.
-        if not legs.sticks or learnt <= LEARNT * noise.length**2:
+        # Feet that slip for most of their stances look like legs of another length. Walking must
+        # have shown something about it.
+        if not legs.sticks or learnt <= 0.05 * noise.length**2:
             return False
-        most = max(WRONG_LENGTH * learnt / noise.length**2, 4.0 * math.sqrt(learnt))
+        most = max(0.06 * learnt / noise.length**2, 4.0 * math.sqrt(learnt))
         self._length.stretched = abs(scale) > most
         if self._length.stretched:
-            self._filter.reshape(self._robot.foot_radius, noise.radius, 0.0, UNKNOWN_LENGTH)
+            self._filter.reshape(self._robot.foot_radius, noise.radius, 0.0, 0.05)
         return self._length.stretched
 
     def _rest(self, time: float, gyro: Array, dq: Array) -> None:
@@ -585,9 +533,10 @@ class BodyEstimator:
             rests.since, rests.total, rests.count = time, np.zeros(3), 0
         if still:
             rests.total, rests.count = rests.total + gyro, rests.count + 1
-            if time - rests.since >= REST_TIME:
+            if time - rests.since >= 0.2:
                 mean = rests.total / rests.count
-                body.rest(mean, math.hypot(noise.gyro / math.sqrt(rests.count), BIAS_FLOOR))
+                # Nothing is quite at rest: 3e-4 rad/s.
+                body.rest(mean, math.hypot(noise.gyro / math.sqrt(rests.count), 3e-4))
                 rests.count = 0
 
     def _estimate(

@@ -126,12 +126,12 @@ class Checks(NamedTuple):
 class Feet:
     """What is known of the contacts of all feet."""
 
-    def __init__(self, legs: int, patience: float) -> None:
+    def __init__(self, legs: int) -> None:
         self.measured = True  # whether forces are measured, not computed from torques
         self.standing = np.zeros(legs, dtype=bool)
         self.left_out = np.zeros(legs, dtype=bool)  # of the filter, but for their height
         self.slow_since = np.full(legs, math.inf)
-        self.patience = np.full(legs, patience)
+        self.patience = np.full(legs, 0.03)  # s for which they must be slow before they stick
         self.spin = np.zeros((legs, 3))  # velocity of rolling for a radius of 1 m, 1/s
         self.moved = np.zeros((legs, 3))  # by body and rolling since the last sample, m
         self.climbing = np.zeros(legs)  # vertical speeds, m/s

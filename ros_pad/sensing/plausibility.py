@@ -19,74 +19,27 @@ from ros_pad.sensing.body_filter import Flags
 # Samples of which one is looked at, where that is enough.
 EVERY = 4
 
-# Time for which a sensor may repeat its reading while the robot moves, s.
-STUCK = 0.2
-
 # Time constant of the share of its stances in which a foot slips, s of stance.
 STANCES = 4.0
 
-# Share above which a foot moves against the others, if half of all feet are below AGREES.
-AGAINST = 0.9
-
-# Shares of their stances in which all feet slip, above which they creep while they seem to stick,
-# and above which they show nothing about their radius and the length of their legs.
-SLIPPERY, SLIPS = 0.35, 0.45
-
-# Share of the time in which no foot sticks, above which feet creep. Where some foot always does,
-# the others may be in the air, with force sensors that read something there.
-NONE_STICKS = 0.03
-
-# Mean speed of its contact point over that of the foot against the body from which on it does.
-FASTER = 0.6
-
-# Speed of a foot against body or ground from which on it shows something, m/s.
-MOVES = 0.02
+# Share of its stances in which a foot slips, above which all feet creep while they seem to stick.
+SLIPPERY = 0.35
 
 # Share below which a foot moves with the others.
 AGREES = 0.5
 
-# Vertical speed from which on a foot is in the air, m/s.
-SWINGS = 0.1
+# Speed of a foot against body or ground from which on it shows something, m/s.
+MOVES = 0.02
 
-# Number of readings in the air whose median is that of the sensor, and time between them, s.
-READINGS, APART = 20, 0.016
+# Number of readings in the air whose median is that of the sensor.
+READINGS = 20
 
-# Largest median of their distances from it, over it: contacts that last are not alike.
-ALIKE = 0.15
-
-# Shares of the expected load up to which readings in the air are left as they are (contacts begin
-# and end while feet move), and above which they are no error of the sensor alone.
-NOTHING, TOO_MUCH = 0.05, 0.5
-
-# Time over which joint positions are compared with their velocities, s.
-STRETCH = 0.5
-
-# Largest difference of both, rad, and what is added to it, as a share of the largest motion.
-UNLIKE, UNLIKE_SHARE = 0.08, 0.3
-
-# Delay between IMU and joints above which there is a doubt, s.
-LATE = 2e-3
-
-# Standard deviations of the delay that it must be above that.
-SURE = 2.0
-
-# Error of the estimated delay that slips cause, s.
-LATE_BIAS = 2.5e-4
+# Share of the expected load up to which readings in the air are left as they are: contacts begin
+# and end while feet move.
+NOTHING = 0.05
 
 # Half of the time over which the gyro is differentiated, s.
 HALF = 0.008
-
-# Length, s, and largest number of stretches of walking that give a delay and its deviation.
-BLOCK, BLOCKS = 2.0, 12
-
-# Stretches of walking without which no delay is known.
-FEWEST = 4
-
-# Difference of foot velocities above which one of them slips, m/s.
-LARGEST = 0.1
-
-# Sum of squared differences of feet's accelerations, m²/s⁴, that a stretch of walking needs.
-LEAST = 10.0
 
 
 class Repeats:
@@ -114,20 +67,21 @@ class Repeats:
         self._doubt = ''
         turns = bool(np.abs(gyro).max() > self._turns)
         steps = bool(np.abs(dq).max() > self._steps)
-        sensors = (
-            ('imu: the gyro', gyro, steps, 1.0),
+        shakes = turns or steps
+        sensors = (  # with the time, s, for which they may repeat while the robot moves
+            ('imu: the gyro repeats its reading', gyro, steps, 0.2),
             # Readings without any noise, as of a calculated motion, are no fault.
-            ('imu: the accelerometer', force, (steps or turns) and gyro.any(), 1.0),
-            ('joints: all joint positions', q, turns, 2.0),
+            ('imu: the accelerometer repeats its reading', force, shakes and gyro.any(), 0.2),
+            ('joints: all joint positions repeat', q, turns, 0.4),
             # Forces may come from contacts that are made or not.
-            ('force: all foot forces', loads, steps, 10.0),
+            ('force: all foot forces repeat', loads, steps, 2.0),
         )
-        for index, (name, values, moves, patience) in enumerate(sensors):
+        for index, (doubt, values, moves, patience) in enumerate(sensors):
             last = self._last[index]
             if values is None or last is None or not (values == last).all():
                 self._last[index], self._since[index] = values, time
-            elif moves and time - self._since[index] > patience * STUCK and values.any():
-                self._doubt = f'{name} repeat{"s its reading" if index < 2 else ""}'
+            elif moves and time - self._since[index] > patience and values.any():
+                self._doubt = doubt
         return self._doubt
 
 
@@ -172,8 +126,8 @@ class Unloaded:
         """
         self.found = False
         if time >= self._next:
-            self._next = time + APART
-            for leg in np.flatnonzero(np.abs(climbing) > SWINGS).tolist():
+            self._next = time + 0.016
+            for leg in np.flatnonzero(np.abs(climbing) > 0.1).tolist():  # m/s: in the air
                 self._rows[leg, self._count[leg] % READINGS] = forces[leg]
                 self._count[leg] += 1
                 if self._count[leg] >= READINGS:
@@ -183,22 +137,19 @@ class Unloaded:
     def _learn(self, leg: int) -> None:
         rows = self._rows[leg]
         offset = np.median(rows, axis=0)
-        size = float(np.abs(offset).max())
-        if np.median(np.abs(rows - offset), axis=0).max() > ALIKE * max(
-            size, NOTHING * self._expected
-        ):
+        size, least = float(np.abs(offset).max()), NOTHING * self._expected
+        # Contacts that last have readings that are not alike.
+        if np.median(np.abs(rows - offset), axis=0).max() > 0.15 * max(size, least):
             return
-        self._much[leg] = size > TOO_MUCH * self._expected
-        wrong = size > NOTHING * self._expected and not self._much[leg]
+        self._much[leg] = size > 0.5 * self._expected  # no error of the sensor alone
+        wrong = size > least and not self._much[leg]
         self.found |= wrong and not self.offset[leg].any()
         self.offset[leg] = offset if wrong else 0.0
 
     def doubt(self) -> str:
         """Return which feet show too much, or an empty text."""
-        if not self._much.any():
-            return ''
-        names = ', '.join(str(self._names[leg]) for leg in np.flatnonzero(self._much))
-        return f'force: foot {names} shows more than half of the expected load in the air'
+        feet = _named(self._names, self._much)
+        return feet and f'force: foot {feet} shows more than half of the expected load in the air'
 
 
 class Joints:
@@ -232,8 +183,8 @@ class Joints:
         moved = q - self._first
         np.maximum(self._apart, np.abs(moved - self._path), out=self._apart)
         np.maximum(self._most, np.maximum(np.abs(moved), np.abs(self._path)), out=self._most)
-        if time - self._begin >= STRETCH:
-            bad = (self._apart > UNLIKE + UNLIKE_SHARE * self._most).ravel()
+        if time - self._begin >= 0.5:
+            bad = (self._apart > 0.08 + 0.3 * self._most).ravel()  # rad
             both = np.flatnonzero(bad & self._bad)
             self._bad, self._doubt = bad, ''
             if both.size:
@@ -277,12 +228,14 @@ class Legs:
     @property
     def slippery(self) -> float:
         """Share of slips beyond SLIPPERY, if now and then no foot sticks, else 0."""
-        return max(0.0, self.share - SLIPPERY) if self._none > NONE_STICKS else 0.0
+        # Where some foot always sticks, the others may be in the air, with force sensors that read
+        # something there.
+        return max(0.0, self.share - SLIPPERY) if self._none > 0.03 else 0.0
 
     @property
     def agree(self) -> bool:
         """Whether feet stick for most of their stances, so that they show something."""
-        return self.share < SLIPS
+        return self.share < 0.45
 
     @property
     def sticks(self) -> bool:
@@ -323,20 +276,16 @@ class Legs:
         before = self.against
         # Where all feet slip for half of their stances, some do so nearly always.
         most = 2 * int((shares < AGREES).sum()) >= len(shares)
-        wrong = (shares > AGAINST) & (means[1] > FASTER * means[2]) & most
+        wrong = (shares > 0.9) & (means[1] > 0.6 * means[2]) & most
         wrong &= self._time > 0.5 * STANCES
         self.against = wrong | (before & (shares > AGREES))
         return bool((self.against & ~before).any())
 
     def doubt(self) -> str:
         """Return which legs do, or an empty text."""
-        if not self.against.any():
-            return ''
-        names = ', '.join(str(self._names[leg]) for leg in np.flatnonzero(self.against))
-        return (
-            f'kinematics: leg {names} moves against the other legs: joint reversed or wrong foot'
-            ' link?'
-        )
+        legs = _named(self._names, self.against)
+        words = 'moves against the other legs: joint reversed or wrong foot link?'
+        return legs and f'kinematics: leg {legs} {words}'
 
 
 class Delay:
@@ -362,7 +311,7 @@ class Delay:
         self._noise = 2.0 * gyro_noise**2  # of both ends
         self._rows: deque[tuple[float, Array, Array, Array, Flags]] = deque(maxlen=64)
         # Products of the line with velocities and with itself, in x and y, and in z.
-        self._blocks: deque[Array] = deque(maxlen=BLOCKS)
+        self._blocks: deque[Array] = deque(maxlen=12)
         self._sums = np.zeros((2, 2))
         self._spent = 0.0
         self._turn = 0
@@ -398,7 +347,7 @@ class Delay:
             return
         speeds = middle[3][feet]
         speeds = speeds - speeds.sum(0) / len(feet)
-        if np.abs(speeds).max() > LARGEST:
+        if np.abs(speeds).max() > 0.1:  # m/s: one of them slips
             return
         arms = middle[2][feet]
         arms = arms - arms.sum(0) / len(feet)
@@ -409,27 +358,32 @@ class Delay:
         self._sums[0] += both[:, 0] + both[:, 1]
         self._sums[1] += both[:, 2]
         self._spent += EVERY * span / len(rows)
-        if self._spent >= BLOCK:
+        if self._spent >= 2.0:  # s
             self._close()
 
     def _close(self) -> None:
         """End a stretch of walking."""
-        if self._sums[:, 1].min() > LEAST:
+        if self._sums[:, 1].min() > 10.0:  # m²/s⁴: feet were moved enough
             self._blocks.append(self._sums)
         self._sums, self._spent = np.zeros((2, 2)), 0.0
-        if len(self._blocks) >= FEWEST:
+        if len(self._blocks) >= 4:
             blocks = np.array(self._blocks)
             total = blocks.sum(0)
             level, upright = slopes = total[:, 0] / total[:, 1]
             rest = (blocks[..., 0] - slopes * blocks[..., 1]) / total[:, 1]
-            self._spread = max(float(np.sqrt((rest * rest).sum(0).max())), LATE_BIAS)
+            self._spread = max(float(np.sqrt((rest * rest).sum(0).max())), 2.5e-4)  # s, of slips
             self._least = min(abs(level), abs(upright)) if level * upright > 0.0 else 0.0
             self.value = float(level + upright) / 2.0
             self.deviation = math.hypot(self._spread, (level - upright) / 2.0)
 
     def doubt(self) -> str:
         """Return a doubt, or an empty text."""
-        if self._least < LATE + SURE * self._spread:
+        if self._least < 2e-3 + 2.0 * self._spread:  # s
             return ''
         word = 'later' if self.value > 0.0 else 'earlier'
         return f'delay: joints are {1e3 * abs(self.value):.0f} ms {word} than the IMU'
+
+
+def _named(names: tuple[str | int, ...], which: Flags) -> str:
+    """Return the names of some legs, with commas between them."""
+    return ', '.join(str(names[leg]) for leg in np.flatnonzero(which).tolist())
