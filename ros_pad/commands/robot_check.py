@@ -72,7 +72,7 @@ def silent(
     if efforts and not any(each.forces for each in rows):
         yield Check('forces', 'ok', 'from the efforts of the joints: no foot force arrives')
     for source in mapping.sources:
-        needed = source.gyro or source.accelerometer or source.joints or not efforts
+        needed = source.gives & {'gyro', 'accelerometer', 'positions'} or not efforts
         if needed and source.topic not in {**found, **refused}:
             same = [name for name, each in topics.items() if each == source.type_name]
             text = f'no message; {source.type_name} is on {", ".join(same) or "no topic"}'

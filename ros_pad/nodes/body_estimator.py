@@ -30,15 +30,8 @@ from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace
 from ros_pad.records import SAMPLE, Block, split
 from ros_pad.sensing import BodyEstimate, SensingStage
 from ros_pad.sensing.mapping import Mapping
-from ros_pad.sensing.stage import (
-    SET_BACK_NS,
-    SETTINGS,
-    JointOrder,
-    estimator_of,
-    robot_of,
-    sample_of,
-    twist_of,
-)
+from ros_pad.sensing.settings import SETTINGS
+from ros_pad.sensing.stage import SET_BACK_NS, estimator_of, robot_of, sample_of, twist_of
 
 PARAMETERS = (
     LEGS,
@@ -148,7 +141,7 @@ class BodyEstimatorNode(PadNode):
             self._warn,
             values['forces'],
         )
-        self._order = JointOrder(robot)
+        self._standard = Mapping.load('default', robot)
         self._samples = _Samples(self.record_output(topics.SAMPLE, legs), len(legs))
         self._doubts = self.output(topics.BODY_DOUBT)
         self._advertise(values['base_frame'], values['publish_tf'])
@@ -224,15 +217,12 @@ class BodyEstimatorNode(PadNode):
 
     def _on_joints(self, message: JointState) -> None:
         try:
-            values = self._order(message.name, message.position, message.velocity, message.effort)
+            readings = self._standard.read('joint_states', message, 0)
         except InvalidInput as error:
             self.stage.reject(error)
             return
-        stamp = message.header.stamp
-        stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
-        if np.isfinite(values[0]).all():
-            self.stage.joints(stamp_ns, *values)
-        self._samples.settle('joints', stamp_ns, self.simulated)
+        readings.pass_to(self.stage)
+        self._samples.settle('joints', readings.stamp, self.simulated)
 
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         """Publish an estimate of the body, and collect what it shows of the feet."""

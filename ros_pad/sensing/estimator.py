@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice, instance, number
+from ros_pad.configuration import instance, number
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Chains, Kinematics, Robot
 from ros_pad.robots.rotation import Array, cross, quaternion, rotation, skew
@@ -21,13 +20,14 @@ from ros_pad.sensing.motion import (
     Doubts,
     Feet,
     FootMotion,
+    Given,
     Length,
-    Noise,
-    Options,
     Rest,
+    Sample,
     checked,
 )
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
+from ros_pad.sensing.settings import SETTINGS
 from ros_pad.sensing.slip_window import SlipWindow
 
 WEIGHT = -float(GRAVITY[2])  # m/s²
@@ -68,19 +68,19 @@ class BodyEstimator:
     robot : Robot
         The robot whose sensors are read.
     gyro_noise : float
-        Standard deviation of a sample of the gyro, rad/s, above 0 up to 1.
+        Standard deviation of a sample of the gyro, rad/s, 1e-6 to 1.
     accelerometer_noise : float
-        Of the accelerometer, m/s², above 0 up to 10.
+        Of the accelerometer, m/s², 1e-6 to 10.
     encoder_noise : float
-        Of a joint position, rad, above 0 up to 0.1.
+        Of a joint position, rad, 1e-6 to 0.1.
     velocity_noise : float
-        Of a joint velocity, rad/s, above 0 up to 10.
+        Of a joint velocity, rad/s, 1e-6 to 10.
     force_noise : float
-        Of a component of a foot's force, N, 0 to 1000.
+        Of a component of a foot's force, N, 0 to 100.
     accelerometer_bias : float
         Standard deviation of the accelerometer's bias, m/s², 0 to 5.
-    contact_share : float, optional
-        Share of the expected load above which a foot stands, 0.01 to 0.9; by default 0.1, and 0.25
+    contact_share : float
+        Share of the expected load above which a foot stands, 0 to 0.9; 0 means 0.1, and 0.25
         where the force comes from joint torques. The expected load is the weight over half of the
         legs.
     window : float
@@ -131,7 +131,7 @@ class BodyEstimator:
         velocity_noise: float = 0.03,
         force_noise: float = 0.3,
         accelerometer_bias: float = 0.05,
-        contact_share: float | None = None,
+        contact_share: float = 0.0,
         window: float = 0.02,
         rate: float = 1000.0,
         force_axes: str = 'base',
@@ -143,27 +143,16 @@ class BodyEstimator:
         if not robot.mass > 0.0:
             raise InvalidInput(f'robot {robot.name!r} is not allowed: its links have no mass')
         self._robot = robot
-        self._noise = Noise(
-            number('gyro_noise', gyro_noise, 'rad/s', 0.0, 1.0, above=True),
-            number('accelerometer_noise', accelerometer_noise, 'm/s2', 0.0, 10.0, above=True),
-            number('encoder_noise', encoder_noise, 'rad', 0.0, 0.1, above=True),
-            number('velocity_noise', velocity_noise, 'rad/s', 0.0, 10.0, above=True),
-            number('force_noise', force_noise, 'N', 0.0, 1000.0),
-            number('accelerometer_bias', accelerometer_bias, 'm/s2', 0.0, 5.0),
-            number('radius_error', radius_error, '(share)', 0.0, 1.0) * robot.foot_radius,
-            number('length_error', length_error, '(share)', 0.0, 0.5),
-        )
-        if contact_share is not None:
-            number('contact_share', contact_share, '(share)', 0.01, 0.9)
-        rate = number('rate', rate, 'Hz', 10.0, 10000.0)
-        length = number('window', window, 's', 0.0, 1.0)
-        self._options = Options(
-            contact_share,
-            length,
-            max(1, round(length * rate)),
-            choice('force_axes', force_axes, ('base', 'foot')) == 'foot',
-            rejection,
-        )
+        number('radius_error', radius_error, '(share)', 0.0, 1.0)
+        number('length_error', length_error, '(share)', 0.0, 0.5)
+        self._given = Given(
+            gyro_noise, accelerometer_noise, encoder_noise, velocity_noise, force_noise,
+            accelerometer_bias, contact_share, window, rate, force_axes,
+            radius_error * robot.foot_radius, length_error, rejection,
+        )  # fmt: skip
+        for setting in SETTINGS:
+            if setting.name != 'forces':
+                setting.accept(getattr(self._given, setting.name))
         errors = np.zeros((9, 9))
         errors[:3, 6:9] = errors[3:6, :3] = errors[6:9, 3:6] = np.eye(3)
         to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
@@ -174,22 +163,22 @@ class BodyEstimator:
 
     def _reset(self) -> None:
         """Discard everything."""
-        robot, noise, options = self._robot, self._noise, self._options
-        legs = len(robot.legs)
-        gate = GATE if options.rejection else math.inf
-        self._filter = BodyFilter(legs, noise.gyro, noise.accelerometer, gate)
+        robot, given, legs = self._robot, self._given, len(self._robot.legs)
+        gate = GATE if given.rejection else math.inf
+        self._filter = BodyFilter(legs, given.gyro_noise, given.accelerometer_noise, gate)
+        samples = max(1, round(given.window * given.rate))
         self._window = SlipWindow(
-            legs, options.window, options.samples, noise.encoder, noise.velocity
+            legs, given.window, samples, given.encoder_noise, given.velocity_noise
         )
         self._time = math.nan
         self._step = 0.0  # the last one, s
         self._feet = Feet(legs)
         self._doubts = Doubts(RECOVERY)
         self._checks = Checks(
-            Repeats(noise.gyro, noise.velocity),
+            Repeats(given.gyro_noise, given.velocity_noise),
             Joints(robot.joint_names),
             Legs(robot),
-            Delay(noise.gyro),
+            Delay(given.gyro_noise),
             Unloaded(robot.legs, self._body.load),
         )
         self._length = Length()
@@ -238,24 +227,30 @@ class BodyEstimator:
                 f'time = {time} s is not allowed: another time than that of the last sample is'
                 ' needed'
             )
-        readings = (gyro, accelerometer, joint_positions, joint_velocities, foot_forces, efforts)
-        given = checked(self._robot.home.shape, readings)
-        gyro, accelerometer, q, dq = given[:4]
-        kinematics = self._robot.chains.solve(q, self._body.to_imu)
-        forces = self._forces(time, kinematics, accelerometer, foot_forces is not None, given[4])
+        shape, size, loads, torques = self._robot.home.shape, (self._robot.home.size,), None, None
+        turn = checked('gyro', gyro, (3,), 'rad/s', 1e3)
+        pull = checked('accelerometer', accelerometer, (3,), 'm/s2', 1e4)
+        q = checked('joint_positions', joint_positions, size, 'rad', 1e4).reshape(shape)
+        dq = checked('joint_velocities', joint_velocities, size, 'rad/s', 1e4).reshape(shape)
+        if foot_forces is not None:
+            loads = checked('foot_forces', foot_forces, (shape[0], 3), 'N', 1e6)
+        if efforts is not None:
+            torques = checked('efforts', efforts, size, 'N m', 1e6).reshape(shape)
         if time < self._time:
             self._reset()
             self._doubts.add(time, 'clock: time went back, odom begins anew')
+        kinematics = self._robot.chains.solve(q, self._body.to_imu)
+        forces = self._forces(time, kinematics, pull, loads, torques)
+        sample = Sample(time, turn, pull, kinematics, dq, forces)
         if math.isnan(self._time):
-            self._begin(time, gyro, accelerometer, dq)
-        contradiction = self._checks.repeats.update(time, gyro, accelerometer, q, dq, forces)
+            self._begin(sample)
+        contradiction = self._checks.repeats.update(time, turn, pull, q, dq, forces)
         contradiction = self._checks.joints.update(time, time - self._time, q, dq) or contradiction
         if contradiction:
             self._doubts.add(time, contradiction)
             if contradiction.startswith('imu'):
                 self._filter.lose(BLIND_TURN)
-        dt = self._advance(time, gyro, accelerometer)
-        return self._process(time, dt, gyro, accelerometer, kinematics, dq, forces)
+        return self._process(sample, self._advance(sample))
 
     @property
     def delay(self) -> tuple[float, float]:
@@ -277,36 +272,38 @@ class BodyEstimator:
         time: float,
         kinematics: Kinematics,
         accelerometer: Array,
-        measured: bool,
-        given: Array,
+        loads: Array | None,
+        torques: Array | None,
     ) -> Array | None:
         """Return the forces on the feet, (legs, 3), N, in IMU axes, or None."""
-        if not given.size:
+        if loads is not None:
+            self._feet.measured = True
+            loads = self._checks.unloaded.update(time, loads, self._feet.climbing)
+            if self._given.force_axes == 'foot':
+                return np.asarray((kinematics.rotations @ loads[..., None])[..., 0])
+            return np.asarray(loads @ self._robot.imu[:3, :3])
+        if torques is None:
             return None
-        self._feet.measured = measured
-        if measured:
-            given = self._checks.unloaded.update(time, given, self._feet.climbing)
-            if self._options.in_foot_axes:
-                return np.asarray((kinematics.rotations @ given[..., None])[..., 0])
-            return np.asarray(given @ self._robot.imu[:3, :3])
+        self._feet.measured = False
         # The specific force has weight and inertia of the legs in one, as far as they move with
         # the body.
-        return forces_of(self._robot.chains, kinematics, given, -accelerometer)
+        return forces_of(self._robot.chains, kinematics, torques, -accelerometer)
 
-    def _begin(self, time: float, gyro: Array, accelerometer: Array, dq: Array) -> None:
+    def _begin(self, sample: Sample) -> None:
         """Begin with the base at the origin, heading along x, tilted as the IMU shows."""
-        strength = math.sqrt(accelerometer @ accelerometer)
+        time, gyro, accelerometer = sample[:3]
+        strength, given = math.sqrt(accelerometer @ accelerometer), self._given
         calm = (
             abs(strength - WEIGHT) < 0.5
-            and np.abs(gyro).max() < 0.05 + 4.0 * self._noise.gyro
-            and np.abs(dq).max() < 0.05 + 4.0 * self._noise.velocity
+            and np.abs(gyro).max() < 0.05 + 4.0 * given.gyro_noise
+            and np.abs(sample.rates).max() < 0.05 + 4.0 * given.velocity_noise
         )
-        tilt = math.hypot(self._noise.accelerometer, self._noise.bias) / WEIGHT
+        tilt = math.hypot(given.accelerometer_noise, given.accelerometer_bias) / WEIGHT
         body = self._filter
         body.spread(
             *((tilt + 2e-3, 0.02) if calm else (0.2, 0.5)),
-            *(UNKNOWN_BIAS, max(self._noise.bias, 1e-3)),
-            *(self._noise.radius, self._noise.length),
+            *(UNKNOWN_BIAS, max(given.accelerometer_bias, 1e-3)),
+            *(given.radius_error, given.length_error),
         )
         body.radius = self._robot.foot_radius
         # The least rotation that turns the reading of the IMU upright, then the base to x.
@@ -323,8 +320,9 @@ class BodyEstimator:
         if not calm and time >= self._doubts.until:
             self._doubts.add(time, 'start: the robot may be moving')
 
-    def _advance(self, time: float, gyro: Array, accelerometer: Array) -> float:
+    def _advance(self, sample: Sample) -> float:
         """Advance the filter to the time of the readings; return the step, s, 0 after a gap."""
+        time, gyro, accelerometer = sample[:3]
         dt, before, self._time = time - self._time, self._step, time
         self._step = dt
         if dt > LONGEST_GAP:
@@ -333,10 +331,8 @@ class BodyEstimator:
         elif dt > LONGEST_STEP:
             self._filter.lose(0.5 * dt, 4.0 * dt)  # of a body that turns and speeds up, SI units
             if before > LONGEST_STEP:  # no foot keeps its foothold
-                self._doubts.add(
-                    time,
-                    f'rate: readings are {dt:.2g} s apart, {LONGEST_STEP} s at most are needed',
-                )
+                text = f'readings are {dt:.2g} s apart, {LONGEST_STEP} s at most are needed'
+                self._doubts.add(time, f'rate: {text}')
         if dt > LONGEST_STEP:
             self._feet.sliding_since = time
             self._feet.standing[:] = False  # their footholds are made anew
@@ -349,36 +345,33 @@ class BodyEstimator:
         self._pull += (math.sqrt(accelerometer @ accelerometer) - self._pull) * step
         return step
 
-    def _process(
-        self,
-        time: float,
-        dt: float,
-        gyro: Array,
-        accelerometer: Array,
-        kinematics: Kinematics,
-        dq: Array,
-        forces: Array | None,
-    ) -> BodyEstimate:
+    def _process(self, sample: Sample, dt: float) -> BodyEstimate:
         """Correct the filter with the feet, and return the estimate."""
+        time, gyro, _, kinematics, dq, forces = sample
         body, legs = self._filter, len(self._feet.standing)
-        lands = self._load(kinematics, forces, time)
+        lands = self._load(sample)
         turn = body.turn
         places, hips = self._placed(kinematics, turn)
         lines = turn @ kinematics.jacobians
         squares = lines @ lines.transpose(0, 2, 1)
         # Kinematics are not quite right.
-        noise = self._noise.encoder**2 * squares + 1e-4**2 * np.eye(3)
+        noise = self._given.encoder_noise**2 * squares + 1e-4**2 * np.eye(3)
         body.set_down(lands, places, hips, noise)
         judged = np.zeros((2, legs), dtype=bool)
         if self._feet.standing.any():
             fixed = not self._checks.legs.agree or bool(
-                np.abs(dq).max() < 0.02 + 5.0 * self._noise.velocity
+                np.abs(dq).max() < 0.02 + 5.0 * self._given.velocity_noise
             )
             trusted = self._feet.standing & ~self._checks.legs.against
             judged = body.stand(places, hips, noise, trusted, self._feet.left_out, fixed)
         if not body.sound():
-            return self._anew(time, gyro, accelerometer, kinematics, dq, forces)
-        self._rest(time, gyro, dq)
+            # Begin anew after readings that no robot can have made.
+            self._reset()
+            self._begin(sample)
+            self._doubts.add(time, 'diverged: odom begins anew')
+            self._advance(sample)
+            return self._process(sample, 0.0)
+        self._rest(sample)
         turn = body.turn
         places, hips = self._placed(kinematics, turn)
         rate = gyro - body.gyro_bias
@@ -415,28 +408,20 @@ class BodyEstimator:
         places = kinematics.positions @ turn.T
         return places + self._filter.scale * (places - hips), hips
 
-    def _anew(self, time: float, *readings: Any) -> BodyEstimate:
-        """Begin anew after readings that no robot can have made."""
-        self._reset()
-        self._begin(time, readings[0], readings[1], readings[3])
-        self._doubts.add(time, 'diverged: odom begins anew')
-        self._advance(time, readings[0], readings[1])
-        return self._process(time, 0.0, *readings)
-
-    def _load(self, kinematics: Kinematics, forces: Array | None, time: float) -> Flags:
+    def _load(self, sample: Sample) -> Flags:
         """Update which feet stand; return those that landed with this sample."""
         before = self._feet.standing
-        if forces is None:
+        if sample.forces is None:
             self._feet.standing = np.zeros_like(before)
-            self._doubts.add(time, 'force: neither foot forces nor efforts')
+            self._doubts.add(sample.time, 'force: neither foot forces nor efforts')
             return self._feet.standing
-        loads = forces @ self._filter.turn[2]
-        share = self._options.contact_share or (0.1 if self._feet.measured else 0.25)
+        loads = sample.forces @ self._filter.turn[2]
+        share = self._given.contact_share or (0.1 if self._feet.measured else 0.25)
         gate = share * self._body.load
-        self._feet.standing = loads > np.where(before, gate, gate + 3.0 * self._noise.force)
+        self._feet.standing = loads > np.where(before, gate, gate + 3.0 * self._given.force_noise)
         lands = self._feet.standing & ~before
         self._feet.left_out &= self._feet.standing
-        if self._options.rejection:
+        if self._given.rejection:
             self._feet.left_out |= lands
             self._feet.patience[lands] = 0.012  # it skids first
             self._feet.slow_since[lands] = math.inf
@@ -451,7 +436,7 @@ class BodyEstimator:
         feet: tuple[Array, Array, Array],
     ) -> None:
         """Update which feet slip: those that slip have a foothold only in height."""
-        if not self._options.rejection:
+        if not self._given.rejection:
             return
         state, slips, (rejected, lifted) = self._feet, self._window.velocity, judged
         speeds = np.hypot(slips[:, 0], slips[:, 1])
@@ -489,11 +474,13 @@ class BodyEstimator:
 
         Return whether what was learnt about them was discarded.
         """
-        feet, legs, noise = self._feet, self._checks.legs, self._noise
+        feet, legs, given = self._feet, self._checks.legs, self._given
         changed = legs.update(dt, feet.standing, feet.left_out, slips, moves)
         if changed or self._checks.unloaded.found:
             # What such legs, or feet that were in the air, have shown is wrong.
-            self._filter.reshape(self._robot.foot_radius, noise.radius, 0.0, noise.length)
+            self._filter.reshape(
+                self._robot.foot_radius, given.radius_error, 0.0, given.length_error
+            )
             return True
         self._filter.creep = 0.03 * legs.slippery  # m after 1 s
         # Joints that are late look like legs of another length, too.
@@ -509,24 +496,25 @@ class BodyEstimator:
                     f' robot, by {100.0 * scale:.0f} +- {100.0 * deviation:.0f} %',
                 )
             return False
-        learnt = noise.length**2 - deviation**2
+        learnt = given.length_error**2 - deviation**2
         # Feet that slip for most of their stances look like legs of another length. Walking must
         # have shown something about it.
-        if not legs.sticks or learnt <= 0.05 * noise.length**2:
+        if not legs.sticks or learnt <= 0.05 * given.length_error**2:
             return False
-        most = max(0.06 * learnt / noise.length**2, 4.0 * math.sqrt(learnt))
+        most = max(0.06 * learnt / given.length_error**2, 4.0 * math.sqrt(learnt))
         self._length.stretched = abs(scale) > most
         if self._length.stretched:
-            self._filter.reshape(self._robot.foot_radius, noise.radius, 0.0, 0.05)
+            self._filter.reshape(self._robot.foot_radius, given.radius_error, 0.0, 0.05)
         return self._length.stretched
 
-    def _rest(self, time: float, gyro: Array, dq: Array) -> None:
+    def _rest(self, sample: Sample) -> None:
         """Average the gyro while nothing moves, and correct its bias."""
-        noise, rests, body = self._noise, self._rests, self._filter
-        turning = 0.02 + 5.0 * noise.gyro + 3.0 * math.sqrt(body.covariance[9, 9])
+        time, gyro = sample[:2]
+        given, rests, body = self._given, self._rests, self._filter
+        turning = 0.02 + 5.0 * given.gyro_noise + 3.0 * math.sqrt(body.covariance[9, 9])
         still = bool(
             self._feet.standing.all()
-            and np.abs(dq).max() < 0.02 + 5.0 * noise.velocity
+            and np.abs(sample.rates).max() < 0.02 + 5.0 * given.velocity_noise
             and np.abs(gyro - body.gyro_bias).max() < turning
         )
         if not still or rests.count == 0:
@@ -536,7 +524,7 @@ class BodyEstimator:
             if time - rests.since >= 0.2:
                 mean = rests.total / rests.count
                 # Nothing is quite at rest: 3e-4 rad/s.
-                body.rest(mean, math.hypot(noise.gyro / math.sqrt(rests.count), 3e-4))
+                body.rest(mean, math.hypot(given.gyro_noise / math.sqrt(rests.count), 3e-4))
                 rests.count = 0
 
     def _estimate(

@@ -90,25 +90,18 @@ class Source(NamedTuple):
         Name of the topic.
     type_name : str
         Its message type, such as ``sensor_msgs/msg/Imu``.
-    stamp : callable
-        Time of the readings, ns, from the message and its arrival, ns.
-    gyro, accelerometer : callable or None
-        The reading of a message, array (3,), or None.
-    joints, forces : callable or None
-        Readings of a message by kind, and forces by index of the leg.
     gives : frozenset of str
-        Kinds of these: ``stamps``, ``positions``, ``velocities``, ``efforts``, and of the forces
-        ``vector``, ``normal`` (one axis) or ``contact`` (flags).
+        What its messages have: ``stamps``, ``gyro``, ``accelerometer``, ``positions``,
+        ``velocities``, ``efforts``, and of forces ``vector``, ``normal`` (one axis) or
+        ``contact`` (flags).
+    read : callable
+        Return the readings of a message and the time of its arrival, ns.
     """
 
     topic: str
     type_name: str
-    stamp: Callable[[Any, int], int]
-    gyro: _Read | None
-    accelerometer: _Read | None
-    joints: _Read | None
-    forces: _Read | None
     gives: frozenset[str]
+    read: Callable[[Any, int], Readings]
 
 
 class Mapping:
@@ -154,9 +147,7 @@ class Mapping:
         self.sources = tuple(sources)
         self.force_axes = axes
         self.missing = (*_missing(self.sources), *notes)
-        gives = frozenset().union(*(source.gives for source in sources))
-        kinds = ('vector', 'normal', 'contact')
-        self.force_kind = next((kind for kind in kinds if kind in gives), '')
+        self.force_kind = next(iter(_force_kinds(self.sources)), '')
         self._sources = {source.topic.lstrip('/'): source for source in sources}
 
     @classmethod
@@ -184,13 +175,13 @@ class Mapping:
         path = configuration.locate('mappings', source)
         table = Table.load(path)
         table.text('description', default='')
-        made_for = table.text('robot', default='')
+        table.text('robot', default='')  # for readers
         sources = []
         axes = table.choice('force_axes', ('base', 'foot'), 'base')
         with table.table('topics') as topics:
             for pattern in topics.keys:
                 with topics.table(pattern) as part:
-                    sources += _sources(part, str(pattern), robot, made_for)
+                    sources += _sources(part, str(pattern), robot)
         notes = table.sequence('missing', ())
         table.finish()
         if not sources:
@@ -227,35 +218,38 @@ class Mapping:
                 f' {", ".join(self._sources)} is needed'
             )
         try:
-            return Readings(
-                source.stamp(message, arrival),
-                source.gyro(message) if source.gyro else None,
-                source.accelerometer(message) if source.accelerometer else None,
-                **(source.joints(message) if source.joints else {}),
-                forces=source.forces(message) if source.forces else {},
-            )
+            return source.read(message, arrival)
         except (AttributeError, IndexError, TypeError, ValueError) as error:
             raise InvalidInput(f'{topic} ({source.type_name}): {error}') from error
+
+
+def _force_kinds(sources: Sequence[Source]) -> list[str]:
+    """Return the kinds of forces that topics give, the best one first."""
+    kinds = ('vector', 'normal', 'contact')
+    return [kind for kind in kinds if any(kind in source.gives for source in sources)]
 
 
 def _missing(sources: Sequence[Source]) -> list[str]:
     """Return what no topic gives, and what follows from that."""
     gives = frozenset().union(*(source.gives for source in sources))
     found = []
-    for name, words in (('gyro', 'raw angular velocity'), ('accelerometer', 'specific force')):
-        if not any(getattr(source, name) for source in sources):
-            found.append(f'{name}: no topic has {words}; the body estimator cannot run without it')
-    if 'positions' not in gives:
-        found.append('joints: no topic has positions; the body estimator cannot run without them')
-    elif 'velocities' not in gives:
+    for kind, what in (
+        ('gyro', 'gyro: no topic has raw angular velocity'),
+        ('accelerometer', 'accelerometer: no topic has specific force'),
+        ('positions', 'joints: no topic has positions'),
+    ):
+        if kind not in gives:
+            found.append(f'{what}; the body estimator cannot run without')
+    if 'velocities' not in gives and 'positions' in gives:
         found.append('joint velocities: differences of positions replace them, with more noise')
-    if not gives & {'vector', 'normal', 'contact', 'efforts'}:
+    forces = _force_kinds(sources)
+    if not forces and 'efforts' not in gives:
         found.append(
             'force: neither foot forces nor efforts; contact and friction are unobservable'
         )
-    elif 'vector' not in gives and 'normal' in gives:
+    elif forces[:1] == ['normal']:
         found.append('friction: unobservable, the force has one axis')
-    elif 'vector' not in gives and 'contact' in gives:
+    elif forces == ['contact']:
         found.append('friction: unobservable, there are flags of contact and no forces')
     if late := [source.topic for source in sources if 'stamps' not in source.gives]:
         text = f'{", ".join(late)} has none; delays of its messages are not corrected'
@@ -263,41 +257,42 @@ def _missing(sources: Sequence[Source]) -> list[str]:
     return found
 
 
-def _sources(part: Table, pattern: str, robot: Robot, made_for: str) -> list[Source]:
+def _sources(part: Table, pattern: str, robot: Robot) -> list[Source]:
     """Read the table of one topic, or of one topic for each leg."""
     type_name = part.text('type')
     if not re.fullmatch(r'[a-z]\w*/msg/[A-Z]\w*', type_name):
         raise ConfigError(
             f'{part.origin}: type = {type_name!r} is not allowed: package/msg/Name is needed'
         )
-    gyro, accelerometer = _vector(part, 'gyro'), _vector(part, 'accelerometer')
-    joints, kinds = _joints(part, robot, made_for)
+    fields = {key: _vector(part, key) for key in ('gyro', 'accelerometer') if key in part}
+    joints, kinds = _joints(part, robot)
     single = '{leg}' in pattern or '{name}' in pattern
     forces, kind = _forces(part, robot, single)
     path = part.text('stamp')
     unit = part.number('tick', 's', 1e-9, 1.0) * 1e9 if 'tick' in part else 0.0
     delay = round(part.number('delay', 's', -1.0, 1.0, default=0.0) * 1e9)
-    gives = frozenset({*kinds, kind, '' if path == 'arrival' else 'stamps'} - {''})
+    field = None if path == 'arrival' else _reader(path, part.origin)
+    gives = frozenset({*fields, *kinds, kind, 'stamps' if field else ''} - {''})
 
-    def made(topic: str, forces: _Read | None) -> Source:
-        read = None if path == 'arrival' else _reader(path, part.origin)
-        return Source(
-            topic, type_name, _clock(read, unit, delay), gyro, accelerometer, joints, forces, gives
-        )
+    def made(topic: str, leg: int = 0) -> Source:
+        stamp = _clock(field, unit, delay)
+
+        def read(message: Any, arrival: int) -> Readings:
+            return Readings(
+                stamp(message, arrival),
+                **{key: vector(message) for key, vector in fields.items()},
+                **(joints(message) if joints else {}),
+                forces={leg + at: force for at, force in forces(message)} if forces else {},
+            )
+
+        return Source(topic, type_name, gives, read)
 
     if not single:
-        return [made(pattern, forces)]
+        return [made(pattern)]
     if forces is None:
         raise ConfigError(f'{part.origin}: a topic of each leg needs a table force')
-
-    def of_leg(leg: int, read: _Read) -> _Read:
-        return lambda message: {leg: read(message)[0]}
-
     return [
-        made(
-            pattern.replace('{leg}', str(leg + 1)).replace('{name}', str(name)),
-            of_leg(leg, forces),
-        )
+        made(pattern.replace('{leg}', str(leg + 1)).replace('{name}', str(name)), leg)
         for leg, name in enumerate(robot.legs)
     ]
 
@@ -327,10 +322,8 @@ def _clock(read: _Read | None, unit: float, delay: int) -> Callable[[Any, int], 
     return stamp
 
 
-def _vector(part: Table, key: str) -> _Read | None:
+def _vector(part: Table, key: str) -> _Read:
     """Read three components of a sensor, turned into the axes of the IMU."""
-    if key not in part:
-        return None
     with part.table(key) as row:
         field, turn = _reader(row.text('field'), row.origin), _turn(row)
         # A covariance whose first element is -1 where nothing is measured.
@@ -359,7 +352,7 @@ def _scale(row: Table, key: str) -> float:
     return row.number(key, '', -1e9, 1e9, default=1.0)
 
 
-def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tuple[str, ...]]:
+def _joints(part: Table, robot: Robot) -> tuple[_Read | None, tuple[str, ...]]:
     """Read what gives readings of joints, or feet in the body for legs that slide along its axes.
 
     Return it, and its kinds: ``positions``, and ``velocities`` and ``efforts`` where given.
@@ -369,9 +362,9 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
     known = list(robot.joint_names)
     with part.table('joints' if 'joints' in part else 'feet') as row:
         if 'joints' in part:
-            names, wanted, signs, offsets = _named(row, known, made_for)
+            names, wanted, signs, offsets = _named(row, known)
         else:
-            offsets, order = _feet(row, robot, made_for)
+            offsets, order = _feet(row, robot)
             names, wanted, signs = lambda _: order, known, np.ones(len(known))
         scale = row.number('scale', '', 1e-9, 1e9, default=1.0)
         scales = {'positions': scale, 'velocities': scale, 'efforts': _scale(row, 'effort_scale')}
@@ -380,6 +373,7 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
             for kind in scales
             if kind == 'positions' or kind in row
         }
+        exact = 'names' in row
     last: dict[tuple[str, ...], Array] = {}  # places by the last names
 
     def read(message: Any) -> dict[str, Array | None]:
@@ -391,10 +385,10 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
         found: dict[str, Array | None] = {}
         for kind, field in fields.items():
             values = np.ravel(np.asarray(field(message), dtype=float))
-            if kind != 'positions' and (not values.size or np.isnan(values).all()):
+            if np.isnan(values).all() and (values.size or kind != 'positions'):
                 found[kind] = None  # drivers leave out, or fill with NaN, what they do not measure
                 continue
-            if len(values) < len(given):
+            if len(values) < len(given) or (exact and len(values) > len(given)):
                 raise InvalidInput(
                     f'{kind} of {len(values)} joints are not allowed: {len(given)} are needed'
                 )
@@ -405,40 +399,41 @@ def _joints(part: Table, robot: Robot, made_for: str) -> tuple[_Read | None, tup
     return read, tuple(fields)
 
 
-def _named(
-    row: Table, known: Sequence[str], made_for: str
-) -> tuple[_Read, list[str], Array, Array]:
+def _named(row: Table, known: Sequence[str]) -> tuple[_Read, list[str], Array, Array]:
     """Read what gives the names in a message, and for each joint its name there, sign and zero."""
+
+    def place(name: Any) -> int:
+        return known.index(configuration.choice('joint', name, known))
+
     if ('names' in row) == ('order' in row):
         raise ConfigError(f'{row.origin}: either names or order is needed')
-    signs, offsets = np.ones(len(known)), np.zeros(len(known))
-    with row.table('rename', default={}) as words:
-        renamed = {_place(words, name, known): words.text(name) for name in words.keys}
-    wanted = [renamed.get(place, name) for place, name in enumerate(known)]
-    for name in row.sequence('reversed', ()):
-        signs[_place(row, name, known)] = -1.0
-    with row.table('offsets', default={}) as values:
-        for name in values.keys:
-            offsets[_place(values, name, known)] = values.number(name, 'rad', -100.0, 100.0)
-    if 'names' in row:
-        return _reader(row.text('names'), row.origin), wanted, signs, offsets
-    order = row.sequence('order')
+    wanted, signs, offsets = list(known), np.ones(len(known)), np.zeros(len(known))
     try:
+        with row.table('rename', default={}) as words:
+            for name in words.keys:
+                wanted[place(name)] = words.text(name)
+        for name in row.sequence('reversed', ()):
+            signs[place(name)] = -1.0
+        with row.table('offsets', default={}) as values:
+            for name in values.keys:
+                offsets[place(name)] = values.number(name, 'rad', -100.0, 100.0)
+        if 'names' in row:
+            return _reader(row.text('names'), row.origin), wanted, signs, offsets
+        order = row.sequence('order')
         _places(wanted, order)
     except InvalidInput as error:
-        hint = f'; this mapping is made for the robot {made_for}' if made_for else ''
-        raise ConfigError(f'{row.origin}: order: {error}{hint}') from None
+        raise ConfigError(f'{row.origin}: {error}') from None
     return lambda _: order, wanted, signs, offsets
 
 
-def _feet(row: Table, robot: Robot, made_for: str) -> tuple[Array, tuple[str, ...]]:
+def _feet(row: Table, robot: Robot) -> tuple[Array, tuple[str, ...]]:
     """Read the legs of places of feet; return what zeroes them, and the order of the joints."""
     zero = np.zeros(robot.home.size)
     lines = robot.foot_jacobians(zero)
     if lines.shape != (len(robot.legs), 3, 3) or np.abs(lines - np.eye(3)).max() > 1e-9:
         raise ConfigError(
             f'{row.origin}: places of feet need a robot whose legs slide along x, y and z,'
-            f' such as {made_for or "go2_feet"}; legs of {robot.name} do not'
+            f' such as go2_feet; legs of {robot.name} do not'
         )
     legs = _legs(row, robot)
     if sorted(legs) != list(range(len(robot.legs))):
@@ -463,23 +458,17 @@ def _forces(part: Table, robot: Robot, single: bool) -> tuple[_Read | None, str]
         legs = (0,) if single else _legs(row, robot)
         # A foot that stands has the load that the estimator expects.
         load = robot.mass * 9.81 / (0.5 * len(robot.legs))
-        offset, made = 0.0, ()
-        if kind == 'vector':
-            turn = _turn(row)
-        elif kind == 'normal':
-            turn = _AXES['z'][:, None] * _scale(row, 'scale')
-            offset = row.number('offset', '', default=0.0)
-        else:
-            turn, made = _AXES['z'][:, None] * load, row.sequence('made', (1,))
+        turn = _turn(row) if kind == 'vector' else _AXES['z'][:, None]
+        if kind == 'normal':
+            offset, scale = row.number('offset', '', default=0.0), _scale(row, 'scale')
 
-    def read(message: Any) -> dict[int, Array]:
+    def read(message: Any) -> list[tuple[int, Array]]:
         if kind == 'vector':
             values = _finite(field(message), 3 * len(legs)).reshape(-1, 3)
         else:
-            values = _finite(field(message), len(legs))[:, None] + offset
-            if kind == 'contact':
-                values = np.isin(values, made).astype(float)
-        return dict(zip(legs, values @ turn.T, strict=True))
+            values = _finite(field(message), len(legs))[:, None]
+            values = load * (values == 1.0) if kind == 'contact' else (values + offset) * scale
+        return list(zip(legs, values @ turn.T, strict=True))
 
     return read, kind
 
@@ -502,20 +491,16 @@ def _legs(row: Table, robot: Robot) -> tuple[int, ...]:
 
 def _places(wanted: Sequence[str], names: Sequence[str]) -> Array:
     """Return where each wanted joint is among names; raise `InvalidInput` for one that is not."""
+    if len(set(names)) < len(names):
+        raise InvalidInput(
+            f'joint names {", ".join(map(str, names))} are not allowed: one is double'
+        )
     for joint in wanted:
         if joint not in names:
             raise InvalidInput(
                 f'joint {joint!r} is not among {", ".join(map(str, names)) or "no names"}'
             )
     return np.array([names.index(joint) for joint in wanted], dtype=np.intp)
-
-
-def _place(row: Table, name: Any, known: Sequence[str]) -> int:
-    """Return the index of a joint; raise `ConfigError` if the robot has none of this name."""
-    try:
-        return known.index(configuration.choice('joint', name, known))
-    except InvalidInput as error:
-        raise ConfigError(f'{row.origin}: {error}') from None
 
 
 def _finite(values: Any, count: int) -> Array:

@@ -4,19 +4,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import quantity
 from ros_pad.errors import InvalidInput
+from ros_pad.robots import Kinematics
 from ros_pad.robots.rotation import Array
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
-
-_NONE = np.zeros(0)
 
 
 class FootMotion(NamedTuple):
@@ -81,27 +79,33 @@ class BodyEstimate(NamedTuple):
     doubt: str
 
 
-class Noise(NamedTuple):
-    """Standard deviations of single readings, and of what is known of the robot; SI units."""
+class Given(NamedTuple):
+    """Arguments of a body estimator; ``radius_error`` in m."""
 
-    gyro: float
-    accelerometer: float
-    encoder: float
-    velocity: float
-    force: float
-    bias: float  # of the accelerometer
-    radius: float  # with which feet roll
-    length: float  # of the legs, relative
-
-
-class Options(NamedTuple):
-    """How readings are used."""
-
-    contact_share: float | None
-    window: float  # s
-    samples: int  # in a window
-    in_foot_axes: bool
+    gyro_noise: float
+    accelerometer_noise: float
+    encoder_noise: float
+    velocity_noise: float
+    force_noise: float
+    accelerometer_bias: float
+    contact_share: float
+    window: float
+    rate: float
+    force_axes: str
+    radius_error: float
+    length_error: float
     rejection: bool
+
+
+class Sample(NamedTuple):
+    """Readings of one moment, in the axes of the IMU."""
+
+    time: float
+    gyro: Array
+    accelerometer: Array
+    kinematics: Kinematics
+    rates: Array  # of the joints, (legs, joints a leg)
+    forces: Array | None  # of the ground on the feet, (legs, 3)
 
 
 class Body(NamedTuple):
@@ -169,42 +173,14 @@ class Rest:
     count: int = 0
 
 
-def checked(joints: tuple[int, ...], readings: Sequence[npt.ArrayLike | None]) -> list[Array]:
-    """Return readings as arrays; raise `InvalidInput` for those not allowed.
-
-    ``joints`` is the shape of the joints of the robot, (legs, joints a leg).
-    """
-    foot_forces = readings[4]
-    size = (joints[0] * joints[1],)
-    names = (
-        ('gyro', (3,), 'rad/s', 1e3),
-        ('accelerometer', (3,), 'm/s2', 1e4),
-        ('joint_positions', size, 'rad', 1e4),
-        ('joint_velocities', size, 'rad/s', 1e4),
-        ('foot_forces', (joints[0], 3), 'N', 1e6),
-        ('efforts', size, 'N m', 1e6),
-    )
-    # The last two may be missing.
-    given: list[tuple[tuple[str, tuple[int, ...], str, float], Any]] = [
-        (names[place], reading)
-        for place, reading in enumerate(readings)
-        if reading is not None or place < 4
-    ]
-    # One look at all of them is enough if they are fine; NaN is not below the limit.
-    if not (
-        all(
-            isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape
-            for (_, shape, _, _), values in given
-        )
-        and np.abs(np.concatenate([np.ravel(values) for _, values in given])).max() < 1e3
-    ):
-        for (name, shape, unit, most), values in given:
-            found = quantity(name, values, unit, -most, most)
-            if found.shape != shape:
-                raise InvalidInput(
-                    f'{name} of shape {found.shape} is not allowed: {shape} is needed'
-                )
-    arrays = [np.asarray(values, dtype=float) for _, values in given]
-    for index in (2, 3) if foot_forces is not None else (2, 3, 4)[: len(arrays) - 2]:
-        arrays[index] = arrays[index].reshape(joints)
-    return [*arrays, _NONE]
+def checked(
+    name: str, values: npt.ArrayLike, shape: tuple[int, ...], unit: str, most: float
+) -> Array:
+    """Return a reading as an array; raise `InvalidInput` for another shape, or above ``most``."""
+    fine = isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape
+    if fine and np.abs(values).max() < most:  # not if it is NaN; `quantity` takes longer
+        return np.asarray(values)
+    found = quantity(name, values, unit, -most, most)
+    if found.shape != shape:
+        raise InvalidInput(f'{name} of shape {found.shape} is not allowed: {shape} is needed')
+    return found

@@ -10,24 +10,23 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import Setting, choice, quantity
+from ros_pad.configuration import choice
 from ros_pad.errors import InvalidInput
 from ros_pad.records import SAMPLE
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array, matrix, skew
 from ros_pad.sensing.estimator import UNKNOWN_BIAS, WEIGHT, BodyEstimate, BodyEstimator
+from ros_pad.sensing.motion import checked
+from ros_pad.sensing.settings import FORCES, SETTINGS
 
 # Difference of time stamps up to which readings are of one moment, ns: joints 4 ms later than the
 # IMU triple the error of the body's velocity.
 SAME_NS = 1_000_000
-
-# Difference of the stamps of IMU and joints above which they cannot be paired, ns.
-APART_NS = 5_000_000
 
 # Age above which the force of a foot is not used any more, ns.
 OLDEST_FORCE_NS = 20_000_000
@@ -37,71 +36,6 @@ LONGEST_DIFFERENCE = 0.05
 
 # Step back of a stamp from which on a clock has been set back, ns; less is a late message.
 SET_BACK_NS = 100_000_000
-
-# Longest time for which the first sample waits until the robot is calm, s: one reading in a jolt
-# would begin odom with a wrong tilt.
-START = 0.2
-
-# Readings in a row that are calm before estimation begins.
-CALM = 5
-
-# Largest difference of the specific force from gravity, m/s², and largest rates of body and
-# joints, rad/s, of a calm robot.
-_CALM_PULL, _CALM_RATE, _CALM_JOINTS = 0.5, 0.1, 0.3
-
-# Time without a sample after which there is a doubt, s.
-SILENCE = 0.4
-
-# Sources of the forces: sensors of the feet, efforts of the joints, or the first that comes.
-FORCES = ('auto', 'feet', 'efforts')
-
-# Settings of a body estimator and its stage, by the names of their arguments.
-SETTINGS = (
-    Setting(
-        'gyro_noise', 0.005, 'Standard deviation of a sample of the gyro.', 'rad/s', 1e-6, 1.0
-    ),
-    Setting(
-        'accelerometer_noise', 0.05, 'Standard deviation of a sample of the accelerometer.',
-        'm/s2', 1e-6, 10.0,
-    ),
-    Setting(
-        'accelerometer_bias', 0.05, 'Standard deviation of the bias of the accelerometer.',
-        'm/s2', 0.0, 5.0,
-    ),
-    Setting(
-        'encoder_noise', 5e-4, 'Standard deviation of the position of a joint.', 'rad', 1e-6, 0.1
-    ),
-    Setting(
-        'velocity_noise', 0.03,
-        'Standard deviation of the velocity of a joint; where velocities are missing, 1.4 times'
-        ' the encoder noise over the period.',
-        'rad/s', 1e-6, 10.0,
-    ),
-    Setting(
-        'force_noise', 0.03, 'Standard deviation of a component of the force on a foot.',
-        'N', 0.0, 100.0,
-    ),
-    Setting(
-        'forces', 'auto',
-        'Source of the forces: sensors of the feet, efforts of the joints, or feet where their'
-        ' forces come, else efforts.',
-        choices=FORCES,
-    ),
-    Setting(
-        'force_axes', 'foot',
-        'Axes of the forces: of the link that carries the foot, or of the base.',
-        choices=('foot', 'base'),
-    ),
-    Setting(
-        'contact_share', 0.0,
-        'Share of the expected load above which a foot stands; 0: 0.1, and 0.25 for efforts.',
-        '', 0.0, 0.9,
-    ),
-    Setting('window', 0.02, 'Time over which slip velocities are averaged.', 's', 0.0, 1.0),
-    Setting('rate', 250.0, 'Samples a second that are expected.', 'Hz', 10.0, 1e4),
-)  # fmt: skip
-
-_Values: TypeAlias = Sequence[float] | npt.NDArray[np.float64]
 
 _NEVER = -(10**18)  # ns, before any stamp
 _LATEST_NS = 50_000_000  # readings of joints wait no longer than this for the IMU
@@ -129,9 +63,8 @@ def estimator_of(robot: Robot, values: Mapping[str, Any]) -> BodyEstimator:
     InvalidInput
         When a value is not allowed.
     """
-    own = {each.name: each.accept(values[each.name]) for each in SETTINGS}
-    del own['forces']  # of the stage
-    return BodyEstimator(robot, **own | {'contact_share': own['contact_share'] or None})
+    own = (each.name for each in SETTINGS if each.name != 'forces')  # which are of the stage
+    return BodyEstimator(robot, **{name: values[name] for name in own})
 
 
 def sample_of(estimate: BodyEstimate) -> np.ndarray:
@@ -143,56 +76,6 @@ def sample_of(estimate: BodyEstimate) -> np.ndarray:
     sds = np.array([foot.slip_velocity_sd for foot in estimate.feet])
     rows['variance'] = np.inf if estimate.doubt else sds[:, None] ** 2
     return rows
-
-
-class JointOrder:
-    """Bring the joints of messages into the order of a robot's: each message has its own names.
-
-    Parameters
-    ----------
-    robot : Robot
-    """
-
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self._places: dict[tuple[str, ...], npt.NDArray[np.intp]] = {}  # by the last names
-
-    def __call__(
-        self, names: Sequence[str], position: _Values, velocity: _Values, effort: _Values
-    ) -> tuple[Array, Array | None, Array | None]:
-        """Return position, velocity and effort of the robot's joints, None where there are none.
-
-        Raises
-        ------
-        InvalidInput
-            When a joint of the robot is missing, a name comes twice, or there is not one value for
-            each name; velocity and effort may be empty.
-        """
-        key = tuple(names)
-        if key not in self._places:
-            self._places = {key: self._found(key)}
-        for part, given in (('position', position), ('velocity', velocity), ('effort', effort)):
-            if len(given) != len(key) and (len(given) or part == 'position'):
-                raise InvalidInput(
-                    f'joint_states: {len(given)} values in {part} are not allowed: {len(key)} are'
-                    ' needed, one for each name'
-                )
-        places = self._places[key]
-        return (
-            np.array(position)[places],
-            np.array(velocity)[places] if len(velocity) else None,
-            np.array(effort)[places] if len(effort) else None,
-        )
-
-    def _found(self, names: tuple[str, ...]) -> npt.NDArray[np.intp]:
-        """Return where each joint of the robot is among names."""
-        missing = [name for name in self._robot.joint_names if name not in names]
-        if missing or len(set(names)) < len(names):
-            wrong = f'without {", ".join(missing)}' if missing else 'with a name twice'
-            raise InvalidInput(
-                f'joint names {wrong} are not allowed: those of {self._robot.name} are needed'
-            )
-        return np.array([names.index(name) for name in self._robot.joint_names])
 
 
 def twist_of(estimate: BodyEstimate, rate: Array, gyro_noise: float) -> tuple[Array, Array]:
@@ -371,17 +254,14 @@ class SensingStage:
             Torques, N m.
         """
         size = len(self._robot.joint_names)
-        names = (('joint positions', 'rad'), ('joint velocities', 'rad/s'), ('efforts', 'N m'))
-        values = {
-            name: (name, each, size, unit)
-            for (name, unit), each in zip(names, (positions, velocities, efforts), strict=True)
-            if each is not None
-        }
-        checked = self._checked(*values.values())
-        if checked is None:
+        given = self._checked(
+            ('joint positions', positions, size, 'rad'),
+            ('joint velocities', velocities, size, 'rad/s'),
+            ('efforts', efforts, size, 'N m'),
+        )
+        if not given:
             return
-        given = dict(zip(values, checked, strict=True))
-        q, dq = given['joint positions'], given.get('joint velocities')
+        q, dq, torques = given
         last_ns, before = self._last_positions or (_NEVER, q)
         if not self._fresh('joints', stamp_ns, last_ns, self._waiting):
             return
@@ -394,27 +274,22 @@ class SensingStage:
             dq = (q - before) / dt
         while self._waiting and self._waiting[0].stamp_ns < stamp_ns - _LATEST_NS:
             self._waiting.popleft()
-        self._waiting.append(_Joints(stamp_ns, q, dq, given.get('efforts')))
+        self._waiting.append(_Joints(stamp_ns, q, dq, torques))
         self._process()
 
-    def _checked(self, *readings: tuple[str, npt.ArrayLike, int, str]) -> list[Array] | None:
-        """Return readings, each with name, values, size and unit, as arrays.
+    def _checked(self, *readings: tuple[str, npt.ArrayLike | None, int, str]) -> list[Any]:
+        """Return readings, each with name, values, size and unit, as arrays; None stays None.
 
-        Reject those that no sensor can have, and return None.
+        Reject those that no sensor can have, and return an empty list.
         """
-        found = []
         try:
-            for name, values, size, unit in readings:
-                found.append(quantity(name, values, unit, -1e6, 1e6))
-                if found[-1].shape != (size,):
-                    raise InvalidInput(
-                        f'{name} of shape {found[-1].shape} is not allowed: {size} numbers are'
-                        ' needed'
-                    )
+            return [
+                None if values is None else checked(name, values, (size,), unit, 1e6).copy()
+                for name, values, size, unit in readings
+            ]
         except InvalidInput as error:
             self.reject(error)
-            return None
-        return found
+            return []
 
     def _fresh(self, source: str, stamp_ns: int, last_ns: int, kept: deque[Any]) -> bool:
         """Return whether a reading is neither late nor double; forget those of a later clock."""
@@ -439,7 +314,7 @@ class SensingStage:
             Force in the axes of its sensor, N.
         """
         given = self._checked(('foot force', force, 3, 'N'))
-        if given is None:
+        if not given:
             return
         kept = self._forces[leg_index]
         if kept and stamp_ns <= kept[-1][0] - SET_BACK_NS:
@@ -470,7 +345,7 @@ class SensingStage:
             self._since.silent_ns = now_ns
             return
         silence = (now_ns - self._since.silent_ns) * 1e-9
-        if silence > SILENCE:
+        if silence > 0.4:  # s
             self._update_doubt(self._missing(silence))
 
     def _missing(self, silence: float) -> str:
@@ -544,11 +419,12 @@ class SensingStage:
     def _starts(self, joints: _Joints, inertial: _Inertial) -> bool:
         """Return whether estimation may begin: the robot is calm, or has not been for long."""
         pull = abs(math.sqrt(inertial.accelerometer @ inertial.accelerometer) - WEIGHT)
-        calm = pull < _CALM_PULL and np.abs(inertial.gyro).max() < _CALM_RATE
-        calm = calm and np.abs(joints.velocities).max() < _CALM_JOINTS
+        calm = pull < 0.5 and np.abs(inertial.gyro).max() < 0.1  # m/s2 and rad/s
+        calm = calm and np.abs(joints.velocities).max() < 0.3
         self._start.calm = self._start.calm + 1 if calm else 0
         self._start.first_ns = min(self._start.first_ns, joints.stamp_ns)
-        return self._start.calm >= CALM or joints.stamp_ns - self._start.first_ns >= START * 1e9
+        # One reading in a jolt would begin odom with a wrong tilt.
+        return self._start.calm >= 5 or joints.stamp_ns - self._start.first_ns >= 200_000_000
 
     def _update(self, joints: _Joints, inertial: _Inertial) -> None:
         """Process a sample."""
@@ -596,7 +472,7 @@ class SensingStage:
 def _between(before: _Inertial, after: _Inertial, stamp_ns: int) -> _Inertial | None:
     """Return the reading at a time between two others, or None if these are too far apart."""
     length = after.stamp_ns - before.stamp_ns
-    if length > 2 * APART_NS:
+    if length > 10_000_000:
         return None
     share = (stamp_ns - before.stamp_ns) / length
     return _Inertial(

@@ -20,7 +20,7 @@ from ros_pad.errors import BagError, InvalidInput, LimitError, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
-from ros_pad.sensing.stage import SETTINGS as BODY_SETTINGS
+from ros_pad.sensing.settings import SETTINGS as BODY_SETTINGS
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import label

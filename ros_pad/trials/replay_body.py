@@ -19,7 +19,9 @@ from ros_pad.errors import ConfigError, InvalidInput, reason
 from ros_pad.records import SAMPLE as SAMPLES
 from ros_pad.records import Block, Field, Kind
 from ros_pad.sensing import BodyEstimate, SensingStage
-from ros_pad.sensing.stage import SETTINGS, JointOrder, estimator_of, robot_of, sample_of
+from ros_pad.sensing import Mapping as Meaning
+from ros_pad.sensing.settings import SETTINGS
+from ros_pad.sensing.stage import estimator_of, robot_of, sample_of
 from ros_pad.trials.comparison import Comparison, Stream, compare
 from ros_pad.trials.label import PARAMETERS
 
@@ -82,7 +84,7 @@ def _play(
 ) -> tuple[Stream, Stream]:
     """Pass what is on these topics to a sensing stage; return its poses and samples."""
     robot = robot_of(values)
-    order, wrong = JointOrder(robot), InvalidInput('no reading can be used')
+    standard, wrong = Meaning.load('default', robot), InvalidInput('no reading can be used')
     poses: list[tuple[int, Block]] = []
     feet: list[tuple[int, Block]] = []
 
@@ -100,12 +102,9 @@ def _play(
     for _, topic, stamp_ns, content in _messages(bag, force, imu, joints):
         if topic == joints:
             try:
-                ordered = order(content.name, content.position, content.velocity, content.effort)
+                standard.read('joint_states', content, 0).pass_to(stage)
             except InvalidInput as error:
                 wrong = error
-                continue
-            if math.isfinite(ordered[0].sum()):
-                stage.joints(stamp_ns, *ordered)
         elif topic == force:
             for index, each in enumerate(content):
                 if math.isfinite(each.sum()):

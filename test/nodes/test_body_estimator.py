@@ -168,9 +168,9 @@ def test_joints_are_matched_by_name(robot):
     ('spoil', 'reason'),
     [
         (lambda robot, ms: robot.imu(ms, covariance=-1.0), 'angular_velocity_covariance'),
-        (lambda robot, ms: robot.joints(ms, CH3R.joint_names[1:]), 'without leg_1_coxa'),
-        (lambda robot, ms: robot.joints(ms, position=[0.0] * 17), '17 values in position'),
-        (lambda robot, ms: robot.joints(ms, effort=[0.0]), '1 values in effort'),
+        (lambda robot, ms: robot.joints(ms, CH3R.joint_names[1:]), "'leg_1_coxa' is not among"),
+        (lambda robot, ms: robot.joints(ms, position=[0.0] * 17), 'positions of 17 joints'),
+        (lambda robot, ms: robot.joints(ms, effort=[0.0]), 'efforts of 1 joints'),
         (lambda robot, ms: robot.forces(ms, (1e300, 0.0, 0.0)), 'force'),
     ],
 )

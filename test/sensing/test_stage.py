@@ -9,7 +9,7 @@ import pytest
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.sensing import BodyEstimator, SensingStage
-from ros_pad.sensing.stage import JointOrder, sample_of
+from ros_pad.sensing.stage import sample_of
 
 MS = 1_000_000
 ROBOT = Robot.load('ch3r')
@@ -295,17 +295,3 @@ def test_estimation_begins_when_the_robot_is_calm():
         watched.imu(ms, pull=(8.0, 0.0, 9.0) if ms < 30 else UP)
         watched.joints(ms)
     assert watched.times == [48, 52, 56, 60]  # 32, 36, 40, 44 and 48 are five calm readings
-
-
-def test_joints_of_a_message_are_brought_into_the_order_of_the_robot():
-    names = [*ROBOT.joint_names[::-1], 'arm']
-    values = np.arange(19.0)
-    position, velocity, effort = JointOrder(ROBOT)(names, values, [], 2.0 * values)
-    assert position.tolist() == [*range(17, -1, -1)]
-    assert velocity is None
-    assert effort == pytest.approx(2.0 * position)
-    for wrong in (names[1:], [*names[:-1], names[0]]):
-        with pytest.raises(InvalidInput, match='joint names'):
-            JointOrder(ROBOT)(wrong, np.zeros(len(wrong)), [], [])
-    with pytest.raises(InvalidInput, match='18 values in position'):
-        JointOrder(ROBOT)(names, values[1:], [], [])

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of sensing: noise of the sensors, and how forces are used."""
+
+from ros_pad.configuration import Setting
+
+# Sources of the forces: sensors of the feet, efforts of the joints, or the first that comes.
+FORCES = ('auto', 'feet', 'efforts')
+
+# Of a body estimator and its stage, by the names of their arguments.
+SETTINGS = (
+    Setting(
+        'gyro_noise', 0.005, 'Standard deviation of a sample of the gyro.', 'rad/s', 1e-6, 1.0
+    ),
+    Setting(
+        'accelerometer_noise', 0.05, 'Standard deviation of a sample of the accelerometer.',
+        'm/s2', 1e-6, 10.0,
+    ),
+    Setting(
+        'accelerometer_bias', 0.05, 'Standard deviation of the bias of the accelerometer.',
+        'm/s2', 0.0, 5.0,
+    ),
+    Setting(
+        'encoder_noise', 5e-4, 'Standard deviation of the position of a joint.', 'rad', 1e-6, 0.1
+    ),
+    Setting(
+        'velocity_noise', 0.03,
+        'Standard deviation of the velocity of a joint; where velocities are missing, 1.4 times'
+        ' the encoder noise over the period.',
+        'rad/s', 1e-6, 10.0,
+    ),
+    Setting(
+        'force_noise', 0.03, 'Standard deviation of a component of the force on a foot.',
+        'N', 0.0, 100.0,
+    ),
+    Setting(
+        'forces', 'auto',
+        'Source of the forces: sensors of the feet, efforts of the joints, or feet where their'
+        ' forces come, else efforts.',
+        choices=FORCES,
+    ),
+    Setting(
+        'force_axes', 'foot',
+        'Axes of the forces: of the link that carries the foot, or of the base.',
+        choices=('foot', 'base'),
+    ),
+    Setting(
+        'contact_share', 0.0,
+        'Share of the expected load above which a foot stands; 0: 0.1, and 0.25 for efforts.',
+        '', 0.0, 0.9,
+    ),
+    Setting('window', 0.02, 'Time over which slip velocities are averaged.', 's', 0.0, 1.0),
+    Setting('rate', 250.0, 'Samples a second that are expected.', 'Hz', 10.0, 1e4),
+)  # fmt: skip
