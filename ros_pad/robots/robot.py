@@ -6,8 +6,9 @@ from __future__ import annotations
 import math
 import os
 import pathlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,15 +25,8 @@ from ros_pad.robots.rotation import Array, from_rpy, transform
 # Fewest and most legs of a robot.
 LEGS = (3, 8)
 
-# Depth by which a robot would sink if one leg carried all of it, m, where a file does not give
-# the stiffness of its legs.
-SAG = 7e-3
-
 # Longest leg, and largest distance of a place on a link from its joint, m.
 LONGEST = 5.0
-
-# Shortest leg, m.
-SHORTEST = 5e-3
 
 # Largest mass of a robot, kg.
 HEAVIEST = 2000.0
@@ -40,7 +34,6 @@ HEAVIEST = 2000.0
 _METRES, _KILOGRAMS = 'm (not mm)', 'kg (not g)'  # of a file in other units, values are refused
 _DOWN = np.array((0.0, 0.0, -9.81))
 _ORIGIN = (0.0, 0.0, 0.0)
-_MIRROR = np.array((1.0, -1.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -130,16 +123,16 @@ class Robot:
     legs: tuple[str | int, ...]
     joint_names: tuple[str, ...]
     mass: float
-    foot_radius: float
-    imu: Array
     chains: Chains
     home: Array
-    gait: Gait | None
-    servo: Servo | None
     centre: Array
     height: float
     inertia: float
     leg_stiffness: float
+    foot_radius: float = 0.0
+    imu: Array = field(default_factory=lambda: np.eye(4))
+    gait: Gait | None = None
+    servo: Servo | None = None
 
     @classmethod
     def load(
@@ -361,15 +354,11 @@ def _check_sizes(robot: Robot) -> None:
     ends = np.concatenate([starts[1:], places.positions[None]])
     lengths = np.linalg.norm(ends - starts, axis=2).sum(0).round(6).tolist()
     away = np.linalg.norm(robot.hips, axis=1).round(6).tolist()
-    for name, joints, length, hip in zip(
-        robot.legs, robot.chains.legs, lengths, away, strict=True
-    ):
-        number(f'leg {name}: distance of the hip from the base', hip, _METRES, 0.0, LONGEST)
-        if any(joint.slides for joint in joints):
-            number(f'leg {name}: length', length, _METRES, 0.0, LONGEST)
-        else:
-            number(f'leg {name}: length', length, _METRES, SHORTEST, LONGEST)
-            number('foot_radius', robot.foot_radius, _METRES, 0.0, length)
+    for leg, joints, length, hip in zip(robot.legs, robot.chains.legs, lengths, away, strict=True):
+        number(f'leg {leg}: distance of the hip from the base', hip, _METRES, 0.0, LONGEST)
+        shortest = 0.0 if any(joint.slides for joint in joints) else 5e-3
+        number(f'leg {leg}: length', length, _METRES, shortest, LONGEST)
+        number('foot_radius', robot.foot_radius, _METRES, 0.0, length)
 
 
 class _Trunk(NamedTuple):
@@ -386,12 +375,11 @@ def _assembled(
     joints: Sequence[Sequence[Joint]],
     feet: Array,
     trunk: _Trunk,
-    home: Array | None = None,
-    **others: Any,
+    home: Array,
+    **given: Any,
 ) -> Robot:
     """Return a robot with the centre of mass and the inertia that follow from its links."""
     chains = Chains(joints, feet)
-    home = np.zeros((chains.count, chains.length)) if home is None else home
     places = chains.solve(home)
     ends = np.concatenate([places.frames[1:, :, :3, 3], places.positions[None]])
     masses, centres, yaw = [trunk.mass], [trunk.centre], trunk.inertia
@@ -407,24 +395,13 @@ def _assembled(
     away = points[:, :2] - centre[:2]
     whole: dict[str, Any] = {
         'mass': mass,
-        'foot_radius': 0.0,
-        'imu': np.eye(4),
-        'gait': None,
-        'servo': None,
         'centre': centre[:2].round(12),
         'height': float(centre[2] - places.positions[:, 2].min()),
         'inertia': yaw + float(weights @ (away * away).sum(1)),
-        'leg_stiffness': mass * 9.81 / SAG,
+        'leg_stiffness': mass * 9.81 / 7e-3,  # it sinks by 7 mm if one leg carries all of it
     }
-    return Robot(
-        name=name,
-        source=name,
-        legs=tuple(legs),
-        joint_names=tuple(joint.name for leg in joints for joint in leg),
-        chains=chains,
-        home=home,
-        **(whole | {key: value for key, value in others.items() if value is not None}),
-    )
+    names = tuple(joint.name for leg in joints for joint in leg)
+    return Robot(name, name, tuple(legs), names, chains=chains, home=home, **(whole | given))
 
 
 def _from_urdf(path: str, feet: Sequence[str], imu: str, **others: Any) -> Robot:
@@ -436,13 +413,12 @@ def _from_urdf(path: str, feet: Sequence[str], imu: str, **others: Any) -> Robot
     home = _posture(joints, others.pop('home', {}), path)
     pose = file.pose(imu) if imu else np.eye(4)
     centre, yaw = file.trunk()
-    names_of_joints = [joint.name for leg in joints for joint in leg]
-    for joint in names_of_joints:
-        if names_of_joints.count(joint) > 1:
-            raise ConfigError(
-                f'{path}: joint {joint!r} is in two legs: each leg needs joints of its own, with'
-                ' different names'
-            )
+    ((common, count),) = Counter(joint.name for leg in joints for joint in leg).most_common(1)
+    if count > 1:
+        raise ConfigError(
+            f'{path}: joint {common!r} is in two legs: each leg needs joints of its own, with'
+            ' different names'
+        )
     rest = file.mass - sum(joint.mass for leg in joints for joint in leg)
     trunk = _Trunk(rest, centre, yaw or _plate(rest, joints))
     return _assembled(file.name, names, joints, tips, trunk, home, imu=pose, **others)
@@ -511,10 +487,7 @@ def _of_file(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot:
 def _of_links(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot:
     """Return the robot whose links a YAML file has."""
     with table.table('imu', default={}) as part:
-        others['imu'] = transform(
-            _place(part, 'at', _ORIGIN),
-            from_rpy(part.vector('rpy', 'rad', default=(0.0, 0.0, 0.0))),
-        )
+        others['imu'] = _pose(part)
     mass = table.number('mass', _KILOGRAMS, 1e-3, HEAVIEST)
     prefix = table.text('prefix', default='')
     links, posture = _links(table)
@@ -524,9 +497,9 @@ def _of_links(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot
         if not LEGS[0] <= len(part.keys) <= LEGS[1]:
             raise ConfigError(f'{part.origin}: 3 to 8 legs are needed, found {len(part.keys)}')
         for leg in part.keys:
-            hip, mirrored = _hip(part, leg)
-            joints.append(_leg(f'{prefix}{leg}_', links, hip, mirrored))
-            feet.append(transform(_mirrored(foot, mirrored), np.eye(3)))
+            hip, mirror = _hip(part, leg)
+            joints.append(_leg(f'{prefix}{leg}_', links, hip, mirror))
+            feet.append(transform(foot * mirror, np.eye(3)))
             legs.append(leg)
     carried = sum(joint.mass for leg in joints for joint in leg)
     if carried > mass:
@@ -561,6 +534,12 @@ def _place(table: Table, key: str, default: tuple[float, ...] | None = None) -> 
     return table.vector(key, _METRES, 3, -LONGEST, LONGEST, **given)
 
 
+def _pose(table: Table) -> Array:
+    """Read ``at`` and ``rpy``: a transform, (4, 4), m."""
+    turn = from_rpy(table.vector('rpy', 'rad', default=(0.0, 0.0, 0.0)))
+    return transform(_place(table, 'at', _ORIGIN), turn)
+
+
 def _links(table: Table) -> tuple[list[Joint], list[float]]:
     """Read the table ``joints``, from the base to the foot, of a leg on the left; and its home."""
     links, home = [], []
@@ -572,10 +551,7 @@ def _links(table: Table) -> tuple[list[Joint], list[float]]:
                     raise ConfigError(f'{row.origin}: axis = {axis.tolist()} has no direction')
                 joint = Joint(
                     str(name),
-                    transform(
-                        _place(row, 'at', _ORIGIN),
-                        from_rpy(row.vector('rpy', 'rad', default=(0.0, 0.0, 0.0))),
-                    ),
+                    _pose(row),
                     axis / length,
                     row.choice('kind', ('revolute', 'prismatic'), 'revolute') == 'prismatic',
                     row.number('mass', _KILOGRAMS, 0.0, HEAVIEST, default=0.0),
@@ -589,28 +565,25 @@ def _links(table: Table) -> tuple[list[Joint], list[float]]:
     return links, home
 
 
-def _hip(table: Table, leg: str | int) -> tuple[Array, bool]:
-    """Read where a leg sits, and whether the places along it are mirrored."""
+def _hip(table: Table, leg: str | int) -> tuple[Array, Array]:
+    """Read where a leg sits, and by what the places along it are multiplied to mirror them."""
     key: str = leg  # type: ignore[assignment]  # YAML has numbers as keys, too
     if not isinstance(leg, (str, int)) or isinstance(leg, bool):
         raise ConfigError(f'{table.origin}: {leg!r} is not allowed: a name or number is needed')
     with table.table(key) as row:
         bearing = row.number('bearing', 'rad', -7.0, 7.0, default=0.0)
         hip = transform(_place(row, 'at'), from_rpy((0.0, 0.0, bearing)))
-        return hip, row.choice('side', ('left', 'right'), default='left') == 'right'
+        side = row.choice('side', ('left', 'right'), default='left')
+        return hip, np.array((1.0, -1.0 if side == 'right' else 1.0, 1.0))
 
 
-def _mirrored(place: Array, mirrored: bool) -> Array:
-    return place * _MIRROR if mirrored else place
-
-
-def _leg(prefix: str, links: Sequence[Joint], hip: Array, mirrored: bool) -> list[Joint]:
+def _leg(prefix: str, links: Sequence[Joint], hip: Array, mirror: Array) -> list[Joint]:
     """Return the joints of a leg at a hip; only places are mirrored, never axes."""
     made = []
     at = hip
     for joint in links:
-        place = transform(_mirrored(joint.at[:3, 3], mirrored), joint.at[:3, :3])
-        centre = _mirrored(joint.centre, mirrored)
+        place = transform(joint.at[:3, 3] * mirror, joint.at[:3, :3])
+        centre = joint.centre * mirror
         made.append(replace(joint, name=prefix + joint.name, at=at @ place, centre=centre))
         at = np.eye(4)
     return made

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.errors import ConfigError, reason
+from ros_pad.configuration import choice, number
+from ros_pad.errors import ConfigError, InvalidInput, reason
 from ros_pad.robots.chains import Joint
 from ros_pad.robots.rotation import Array, from_rpy, transform
 
-MOVING = ('revolute', 'continuous', 'prismatic')
-LIMITED = ('revolute', 'prismatic')
+KINDS = ('fixed', 'revolute', 'continuous', 'prismatic')
 
 
 class _Joint(NamedTuple):
@@ -71,14 +71,18 @@ class Urdf:
         if tree.tag != 'robot':
             raise self._error(f'expected <robot>, found <{tree.tag}>')
         self.name = tree.get('name', pathlib.Path(path).stem)
-        self._links = {self._text(link, 'name'): self._link(link) for link in tree.iter('link')}
         self._joints: dict[str, _Joint] = {}  # by child
-        # Transmissions and ros2_control have elements <joint> too, but deeper in the tree.
-        for element in tree.findall('joint'):
-            joint = self._joint(element)
-            if joint.child in self._joints:
-                raise self._error(f'link {joint.child!r} has two parents')
-            self._joints[joint.child] = joint
+        try:
+            self._links = {_text(link, 'name'): _link(link) for link in tree.iter('link')}
+            # Transmissions and ros2_control have elements <joint> too, but deeper in the tree.
+            for joint in map(_joint, tree.findall('joint')):
+                choice(f'joint {joint.name!r}: parent', joint.parent, [*self._links])
+                choice(f'joint {joint.name!r}: child', joint.child, [*self._links])
+                if joint.child in self._joints:
+                    raise self._error(f'link {joint.child!r} has two parents')
+                self._joints[joint.child] = joint
+        except InvalidInput as error:
+            raise self._error(str(error)) from None
         roots = [name for name in self._links if name not in self._joints]
         if len(roots) != 1:
             raise self._error(f'one link without a parent is needed, found {roots}')
@@ -100,10 +104,10 @@ class Urdf:
             at = at @ joint.at
             if joint.kind == 'fixed':
                 continue
-            if joint.kind not in MOVING:
+            if joint.kind not in KINDS:
                 raise self._error(
                     f'joint {joint.name!r}: type = {joint.kind!r} is not allowed:'
-                    f' one of fixed, {", ".join(MOVING)} is needed'
+                    f' one of {", ".join(KINDS)} is needed'
                 )
             if joint.mimics:
                 raise self._error(
@@ -175,91 +179,83 @@ class Urdf:
             if joint.parent == link and joint.kind == 'fixed':
                 yield from self._fixed(joint.child, at @ joint.at)
 
-    def _joint(self, element: xml.Element) -> _Joint:
-        name = self._text(element, 'name')
-        parent, child, axis = (element.find(tag) for tag in ('parent', 'child', 'axis'))
-        if parent is None or child is None:
-            raise self._error(f'joint {name!r} needs <parent> and <child>')
-        kind = self._text(element, 'type')
-        line = np.array((1.0, 0.0, 0.0)) if axis is None else self._numbers(axis, 'xyz', name)
-        length = math.sqrt(line @ line)
-        if kind in MOVING and length < 1e-6:
-            raise self._error(f'joint {name!r}: axis {line.tolist()} has no direction')
-        made = _Joint(
-            name,
-            kind,
-            self._text(parent, 'link'),
-            self._text(child, 'link'),
-            self._placed(element, name),
-            line / (length or 1.0),
-            self._limits(element, name) if kind in LIMITED else (-math.inf, math.inf),
-            '' if (mimic := element.find('mimic')) is None else self._text(mimic, 'joint'),
-        )
-        for link in (made.parent, made.child):
-            if link not in self._links:
-                raise self._error(f'joint {name!r} names a link {link!r} that is not there')
-        return made
-
-    def _limits(self, element: xml.Element, name: str) -> tuple[float, float]:
-        """Return the limits of a joint, rad or m; exporters write 0 and 0 where they know none."""
-        limit = element.find('limit')
-        if limit is None:
-            return -math.inf, math.inf
-        low, high = self._values(limit, name, 'lower', 'upper')
-        if low > high:
-            raise self._error(
-                f'joint {name!r}: lower = {low:g} is not allowed: at most upper = {high:g} is'
-                ' needed'
-            )
-        return (low, high) if low < high else (-math.inf, math.inf)
-
-    def _link(self, link: xml.Element) -> _Link:
-        """Return mass, kg, centre of mass, m, and inertia, kg m², of a link."""
-        inertial, name = link.find('inertial'), link.get('name', '')
-        if inertial is None:
-            return _Link(0.0, np.zeros(3), np.zeros((3, 3)))
-        at, mass, tensor = self._placed(inertial, name), 0.0, np.zeros((3, 3))
-        if (element := inertial.find('mass')) is not None:
-            (mass,) = self._values(element, name, 'value')
-        if mass < 0.0:
-            raise self._error(f'{name!r}: mass = {mass:g} is not allowed: at least 0 kg is needed')
-        if (element := inertial.find('inertia')) is not None:
-            keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
-            xx, xy, xz, yy, yz, zz = self._values(element, name, *keys)
-            tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
-        return _Link(mass, at[:3, 3], at[:3, :3] @ tensor @ at[:3, :3].T)
-
-    def _values(self, element: xml.Element, name: str, *keys: str) -> list[float]:
-        """Return single numbers."""
-        return [float(self._numbers(element, key, name, 1)[0]) for key in keys]
-
-    def _placed(self, element: xml.Element, name: str) -> Array:
-        origin = element.find('origin')
-        if origin is None:
-            return np.eye(4)
-        place, angles = (self._numbers(origin, key, name) for key in ('xyz', 'rpy'))
-        return transform(place, from_rpy(angles))
-
-    def _numbers(self, element: xml.Element, key: str, name: str, count: int = 3) -> Array:
-        text = element.get(key, ' '.join(count * ['0']))
-        try:
-            numbers = np.array([float(word) for word in text.split()])
-        except ValueError:
-            numbers = np.array([])
-        if numbers.shape != (count,) or not np.isfinite(numbers).all():
-            raise self._error(
-                f'{name!r}: {key} = {text!r} is not allowed: {count} finite number(s) needed'
-            )
-        return numbers
-
-    def _text(self, element: xml.Element, key: str) -> str:
-        text = element.get(key)
-        if not text:
-            raise self._error(f'<{element.tag}> needs {key}="…"')
-        return text
-
     def _error(self, problem: str) -> ConfigError:
         return ConfigError(f'{self._origin}: {problem}')
+
+
+def _joint(element: xml.Element) -> _Joint:
+    name, kind = _text(element, 'name'), _text(element, 'type')
+    parent, child = element.find('parent'), element.find('child')
+    if parent is None or child is None:
+        raise InvalidInput(f'joint {name!r} needs <parent> and <child>')
+    axis, limit, mimic = (element.find(tag) for tag in ('axis', 'limit', 'mimic'))
+    line = np.array((1.0, 0.0, 0.0)) if axis is None else _numbers(axis, 'xyz', name)
+    length = math.sqrt(line @ line)
+    if kind != 'fixed' and length < 1e-6:
+        raise InvalidInput(f'joint {name!r}: axis {line.tolist()} has no direction')
+    limits = -math.inf, math.inf
+    if kind in ('revolute', 'prismatic') and limit is not None:
+        low, high = (_number(limit, key, name) for key in ('lower', 'upper'))
+        number(f'joint {name!r}: lower', low, 'rad or m', -math.inf, high)
+        if low < high:  # exporters write 0 and 0 where they know none
+            limits = low, high
+    return _Joint(
+        name,
+        kind,
+        _text(parent, 'link'),
+        _text(child, 'link'),
+        _placed(element, name),
+        line / (length or 1.0),
+        limits,
+        '' if mimic is None else _text(mimic, 'joint'),
+    )
+
+
+def _link(link: xml.Element) -> _Link:
+    """Return mass, kg, centre of mass, m, and inertia, kg m², of a link."""
+    inertial, name = link.find('inertial'), link.get('name', '')
+    if inertial is None:
+        return _Link(0.0, np.zeros(3), np.zeros((3, 3)))
+    at, mass, tensor = _placed(inertial, name), 0.0, np.zeros((3, 3))
+    if (element := inertial.find('mass')) is not None:
+        mass = number(f'link {name!r}: mass', _number(element, 'value', name), 'kg')
+    if (element := inertial.find('inertia')) is not None:
+        keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+        xx, xy, xz, yy, yz, zz = (_number(element, key, name) for key in keys)
+        tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+    return _Link(mass, at[:3, 3], at[:3, :3] @ tensor @ at[:3, :3].T)
+
+
+def _placed(element: xml.Element, name: str) -> Array:
+    origin = element.find('origin')
+    if origin is None:
+        return np.eye(4)
+    return transform(_numbers(origin, 'xyz', name), from_rpy(_numbers(origin, 'rpy', name)))
+
+
+def _number(element: xml.Element, key: str, name: str) -> float:
+    return float(_numbers(element, key, name, 1)[0])
+
+
+def _numbers(element: xml.Element, key: str, name: str, count: int = 3) -> Array:
+    """Return the numbers of an attribute, zero where there is none, of a joint or link."""
+    text = element.get(key, count * '0 ')
+    try:
+        numbers = np.array(text.split(), dtype=float)
+    except ValueError:
+        numbers = np.array([])
+    if numbers.shape != (count,) or not np.isfinite(numbers).all():
+        raise InvalidInput(
+            f'{name!r}: {key} = {text!r} is not allowed: {count} finite number(s) needed'
+        )
+    return numbers
+
+
+def _text(element: xml.Element, key: str) -> str:
+    text = element.get(key)
+    if not text:
+        raise InvalidInput(f'<{element.tag}> needs {key}="…"')
+    return text
 
 
 def read(
