@@ -14,7 +14,15 @@ from ros_pad.configuration import Setting, Table, choice, number, quantity
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots.rotation import Array
 
-GAITS = ('tripod', 'trot', 'wave', 'crawl', 'ripple')
+_LEGS: dict[str, Sequence[int]] = {
+    'tripod': (6, 8),
+    'trot': (4,),
+    'wave': range(3, 9),
+    'crawl': (4,),
+    'ripple': range(3, 9),
+}
+
+GAITS = tuple(_LEGS)
 """Names of the gaits that :meth:`Gait.named` makes."""
 
 
@@ -103,14 +111,17 @@ class Gait:
                 f'hips of shape {places.shape} is not allowed: a row for each leg, with x and y,'
                 ' is needed'
             )
-        legs = len(places)
+        legs, allowed = len(places), _LEGS[name]
+        if legs not in allowed:
+            raise InvalidInput(
+                f'gait = {name!r} is not allowed for {legs} legs: a {name} needs'
+                f' {" or ".join(map(str, allowed))} legs'
+            )
         if name in ('tripod', 'trot'):
-            _check_legs(name, legs, (6, 8) if name == 'tripod' else (4,))
             # Neighbours round the body, counter-clockwise from the front.
             angles = np.arctan2(places[:, 1], places[:, 0]) % math.tau
             phases = 0.5 * (np.argsort(np.argsort(angles)) % 2)
         else:
-            _check_legs(name, legs, (4,) if name == 'crawl' else range(3, 9))
             phases = _waves(places, apart=name == 'ripple')
             if name != 'ripple':
                 number('duty', duty, f'(share) for a {name} of {legs} legs', 1.0 - 1.0 / legs)
@@ -139,24 +150,19 @@ class Gait:
         ConfigError
             When a value is missing or not allowed.
         """
-
-        def given(key: str, unit: str, low: float, high: float) -> float:
-            if usual is None:
-                return table.number(key, unit, low, high)
-            return table.number(key, unit, low, high, default=getattr(usual, key))
-
-        cycle, duty = given('cycle', 's', 0.05, 60.0), given('duty', '(share)', 0.05, 0.95)
-        lift = given('lift', 'm', 0.0, 1.0)
+        own = {} if usual is None else vars(usual)
+        cycle, duty, lift = (
+            table.number(key, unit, **({'default': own[key]} if own else {}))
+            for key, unit in (('cycle', 's'), ('duty', '(share)'), ('lift', 'm'))
+        )
+        pushes = False
         try:
-            if 'kind' not in table and usual is not None:
-                phases, pushes = usual.phases, usual.pushes
+            if own and 'kind' not in table:
+                phases, pushes = own['phases'], own['pushes']
             elif (kind := table.choice('kind', (*GAITS, 'own'))) == 'own':
-                size = len(np.asarray(hips))
-                phases = tuple(table.vector('phases', '(share)', size, 0.0, 1.0).tolist())
-                pushes = False
+                phases = tuple(table.vector('phases', '(share)', len(np.asarray(hips))).tolist())
             else:
                 phases = cls.named(kind, hips, cycle, duty, lift).phases
-                pushes = False
             pushes = table.value(Setting('pushes', bool, ''), pushes)
             return cls(cycle, duty, phases, lift, pushes)
         except InvalidInput as error:
@@ -191,14 +197,6 @@ class Gait:
             True in stance.
         """
         return self.phase(time) < self.duty
-
-
-def _check_legs(name: str, legs: int, allowed: Sequence[int]) -> None:
-    if legs not in allowed:
-        raise InvalidInput(
-            f'gait = {name!r} is not allowed for {legs} legs: a {name} needs'
-            f' {" or ".join(map(str, allowed))} legs'
-        )
 
 
 def _waves(places: Array, apart: bool) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from operator import sub
 
 import numpy as np
 
@@ -16,8 +15,6 @@ from ros_pad.robots.rotation import Array, cross
 
 Place = tuple[float, float, float]
 
-_PARALLEL = 1e-9
-_SHORTEST = 1e-6  # m, of a link
 _ROUNDING = 1e-9
 
 
@@ -81,9 +78,9 @@ class LegSolver:
         hip, thigh, knee = joints
         across = thigh.at[:3, :3] @ thigh.axis
         last = thigh.at[:3, :3] @ knee.at[:3, :3] @ knee.axis
-        parallel = np.abs(cross(across, last)).max() < _PARALLEL
+        parallel = np.abs(cross(across, last)).max() < 1e-9
         links = cross(thigh.axis, knee.at[:3, 3]), cross(knee.axis, foot[:3, 3])
-        apart = min(np.abs(link).max() for link in links) > _SHORTEST
+        apart = min(np.abs(link).max() for link in links) > 1e-6  # m
         return bool(parallel and apart and np.abs(cross(hip.axis, across)).max() > 1e-3)
 
     def angles(self, x: float, y: float, z: float) -> list[float]:
@@ -120,8 +117,10 @@ class LegSolver:
         thigh = math.remainder(math.atan2(v, u) - end - self._start, math.tau)
         knee = math.remainder(self._sense * (fold - self._fold), math.tau)
         found = [hip, thigh, knee]
-        if self._far and max(map(abs, map(sub, found, self._home))) > math.pi:
-            return self._near_home(found)
+        if self._far:  # the same angles may be more than half a turn from home
+            for index, (angle, home) in enumerate(zip(found, self._home, strict=True)):
+                if abs(angle - home) > math.pi:
+                    found[index] = angle + math.tau * round((home - angle) / math.tau)
         return found
 
     @staticmethod
@@ -144,13 +143,6 @@ class LegSolver:
                 ' the side of home'
             )
         return math.copysign(1.0, bend)
-
-    def _near_home(self, angles: Sequence[float]) -> list[float]:
-        """Return the same angles, rad, at most half a turn from home."""
-        return [
-            angle + math.tau * round((home - angle) / math.tau)
-            for angle, home in zip(angles, self._home, strict=True)
-        ]
 
 
 class FeetSolver:
@@ -183,11 +175,11 @@ class FeetSolver:
             found: list[float] = self._near.ravel().tolist()
             return found
         angles: list[float] = []
-        try:
-            for leg, (x, y, z) in zip(self._legs, feet, strict=True):
-                angles += leg.angles(x, y, z)
-        except InvalidInput as error:
-            raise InvalidInput(f'leg {self._robot.legs[len(angles) // 3]}: {error}') from error
+        for name, leg, place in zip(self._robot.legs, self._legs, feet, strict=True):
+            try:
+                angles += leg.angles(*place)
+            except InvalidInput as error:
+                raise InvalidInput(f'leg {name}: {error}') from error
         return angles
 
 

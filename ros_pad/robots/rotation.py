@@ -82,11 +82,5 @@ def quaternion(turn: Array) -> Array:
 
 def matrix(turn: Any) -> Array:
     """Return the rotation of a unit quaternion x y z w."""
-    x, y, z, w = turn
-    return np.array(
-        (
-            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
-            (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
-            (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
-        )
-    )
+    axis = skew(turn[:3])
+    return np.eye(3) + 2.0 * turn[3] * axis + 2.0 * axis @ axis
