@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import importlib
 import importlib.util
 import json
 import os
@@ -19,16 +18,15 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import textwrap
 import threading
 import time
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
 from importlib import metadata
+from typing import NamedTuple
 
-from ros_pad.commands.command import WIDEST, Commands, add_command, complain
+from ros_pad.commands.command import Commands, add_command, complain
 
 DISTRIBUTION = 'jazzy'  # distribution of ROS 2 with which ros_pad is tested
 NEEDED = ('numpy', 'scipy', 'yaml', 'tqdm', 'mcap', 'rosbags', 'serial')
@@ -70,6 +68,7 @@ pad doctor
 pad doctor --json
 pad doctor --robot go2 --mapping go2
 pad doctor --robot my_robot.urdf --feet lf_foot rf_foot lh_foot rh_foot --bag my_bag"""
+_INSTALL = 'pip install --editable . in the folder of ros_pad, or rosdep install'
 _ONE_ROS = (
     'one ROS 2 at a time: open a new shell and either source /opt/ros/jazzy/setup.bash or'
     ' activate .venv, not both; unset RMW_IMPLEMENTATION, or install what it names'
@@ -81,14 +80,13 @@ _DISCOVERY = (
     ' runs'
 )
 _DISCOVERY_VARIABLES = (  # that can keep nodes from connecting
-    'ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS', 'ROS_LOCALHOST_ONLY',
-    'ROS_DISCOVERY_SERVER', 'CYCLONEDDS_URI', 'FASTRTPS_DEFAULT_PROFILES_FILE',
-    'FASTDDS_DEFAULT_PROFILES_FILE',
+    'RMW_IMPLEMENTATION', 'ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS',
+    'ROS_LOCALHOST_ONLY', 'ROS_DISCOVERY_SERVER', 'CYCLONEDDS_URI',
+    'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE',
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Result of a check.
 
     ``status`` is ``ok``, ``warning`` or ``problem``; ``advice`` may be empty.
@@ -155,52 +153,71 @@ def run(options: argparse.Namespace) -> int:
         for status in ('problem', 'warning')
     }
     if options.json:
-        print(json.dumps(counts | {'findings': [asdict(each) for each in found]}))
+        print(json.dumps(counts | {'findings': [each._asdict() for each in found]}))
     else:
         for each in found:
-            _show(each)
+            print(f'{each.status:8} {each.what}: {each.found}')
+            if each.advice:
+                print(f'{"":9}-> {each.advice}')
         print('\n' + ', '.join(f'{status}: {count}' for status, count in counts.items()))
     return 1 if counts['problems'] else 0
-
-
-def _show(finding: Finding) -> None:
-    # Paths and settings are not broken, so that they can be copied.
-    wrapper = textwrap.TextWrapper(
-        min(shutil.get_terminal_size().columns, WIDEST), subsequent_indent=' ' * 12,
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
-    print(wrapper.fill(f'{finding.status:8} {finding.what}: {finding.found}'))
-    if finding.advice:
-        print(wrapper.fill(f'{"":9}-> {finding.advice}'))
 
 
 def examine() -> Iterator[Finding]:
     """Run all checks one after the other, and yield their findings."""
     for check in (python, packages, extras, config_folder, ros, serial_ports, folders):
+        yield from tried(check)
+
+
+def tried(check: Callable[[], Iterator[Finding]]) -> Iterator[Finding]:
+    """Run a check; whatever a broken package raises is a problem of its own."""
+    try:
         yield from check()
+    except Exception as error:
+        what = check.__name__.replace('_', ' ')
+        yield Finding(what, 'problem', f'{type(error).__name__}: {error}', _INSTALL)
 
 
 def python(version: Sequence[int | str] = sys.version_info) -> Iterator[Finding]:
     """Check the version of Python."""
-    text = f'{".".join(map(str, version[:3]))}, {sys.executable}'
-    if (3, 11) <= tuple(version[:2]) <= (3, 13):
-        yield Finding('Python', 'ok', text)
-    else:
-        status = 'problem' if tuple(version[:2]) < (3, 11) else 'warning'
-        yield Finding('Python', status, text, 'ros_pad is tested with 3.11 to 3.13')
+    status = 'ok' if (3, 11) <= tuple(version[:2]) <= (3, 13) else 'warning'
+    text = f'{".".join(map(str, version[:3]))} (tested: 3.11 to 3.13), {sys.executable}'
+    yield Finding('Python', status, text)
+
+
+_IMPORT = """
+import importlib, json, sys
+sys.path[:], wrong = PATH, {}
+for name in NAMES:
+    try:
+        importlib.import_module(name)
+    except Exception as error:
+        wrong[name] = f'{type(error).__name__}: {error}'
+print('\\n' + json.dumps(wrong))
+"""
+
+
+def imports(names: Sequence[str]) -> dict[str, str]:
+    """Import modules in a process of their own; return the errors by name."""
+    code = _IMPORT.replace('PATH', repr(sys.path)).replace('NAMES', repr(names))
+    try:
+        child = subprocess.run(
+            [sys.executable, '-c', code], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            errors='replace', timeout=STARTING,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return {names[0]: f'its import did not end within {STARTING:g} s'}
+    if child.returncode:
+        text = f'its import ends with status {child.returncode}: {_last_line(child.stderr)}'
+        return {names[0]: text}
+    return json.loads(_last_line(child.stdout))
 
 
 def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
     """Check that the dependencies of ros_pad can be imported, and report its version."""
-    wrong = []
-    for name in names:
-        try:
-            importlib.import_module(name)
-        except Exception as error:  # whatever a broken package raises
-            wrong.append(f'{name} ({type(error).__name__}: {error})')
-    if wrong:
-        advice = 'pip install --editable . in the folder of ros_pad, or rosdep install'
-        yield Finding('packages', 'problem', f'not usable: {", ".join(wrong)}', advice)
+    if wrong := imports(names):
+        text = ', '.join(f'{name} ({error})' for name, error in wrong.items())
+        yield Finding('packages', 'problem', f'not usable: {text}', _INSTALL)
         return
     yield Finding('packages', 'ok', ', '.join(names))
     from ros_pad.trials import label
@@ -211,100 +228,51 @@ def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
 
 
 def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
-    """Check the packages that only some users need, importing each in a process of its own."""
-
-    def error_of(name: str) -> str:
-        if not importlib.util.find_spec(name):
-            return 'not installed'
-        code = f'import sys; sys.path[:] = {sys.path!r}; import {name}'
-        return _child(code, f'import {name}')[0]
-
+    """Check the packages that only some users need; a broken one may end its process."""
     with ThreadPoolExecutor() as pool:
-        errors = list(pool.map(error_of, names))
+        errors = list(pool.map(lambda name: imports([name]).get(name), names))
     for name, error in zip(names, errors, strict=True):
         extra, purpose = EXTRAS[name]
         if error:
             advice = f'pip install "ros_pad[{extra}]", in a checkout: pip install -e ".[{extra}]"'
-            yield Finding(name, 'warning', f'{error}: {purpose}', advice)
+            yield Finding(name, 'warning', f'{purpose}: {error}', advice)
         else:
             with contextlib.suppress(metadata.PackageNotFoundError):
                 purpose = f'{metadata.version(name)}: {purpose.partition(";")[0]}'
             yield Finding(name, 'ok', purpose)
 
 
-def _child(code: str, what: str) -> tuple[str, str]:
-    """Run Python code in a separate process; return an error (or an empty text) and its output."""
-    try:
-        child = subprocess.run(
-            [sys.executable, '-c', code],
-            stdin=subprocess.DEVNULL, capture_output=True, text=True, errors='replace',
-            timeout=STARTING,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return f'{what} did not end within {STARTING:g} s', ''
-    if child.returncode:
-        return f'{what} ends with status {child.returncode}: {_last_line(child.stderr)}', ''
-    return '', child.stdout
-
-
 def config_folder() -> Iterator[Finding]:
     """Check that the folder of the shipped configuration is found; count its files."""
-    try:
-        from ros_pad import configuration
+    from ros_pad import configuration
 
-        folder = configuration.shared_folder()
-        kinds = ('scenes', 'feet', 'materials', 'robots', 'mappings')
-        counts = [f'{len(configuration.names(kind))} {kind}' for kind in kinds]
-        yield Finding('config folder', 'ok', f'{folder}: {", ".join(counts)}')
-    except Exception as error:  # ConfigError, or any error of the import
-        advice = 'source install/setup.bash of your workspace, or pip install ros_pad again'
-        yield Finding('config folder', 'problem', str(error), advice)
-
-
-_ROS = """
-import importlib, json
-found = {'wrong': [], 'path': '', 'rmw': ''}
-for name in MODULES:
-    try:
-        importlib.import_module(name)
-    except Exception as error:
-        found['wrong'].append(f'{name} ({type(error).__name__}: {error})')
-if 'rclpy' not in ' '.join(found['wrong']):
-    import rclpy
-    found['path'] = rclpy.__file__
-    try:
-        found['rmw'] = rclpy.get_rmw_implementation_identifier()
-    except Exception as error:
-        found['wrong'].append(f'middleware ({type(error).__name__}: {error})')
-print(json.dumps(found))
-"""
+    folder = configuration.shared_folder()
+    kinds = ('scenes', 'feet', 'materials', 'robots', 'mappings')
+    counts = [f'{len(configuration.names(kind))} {kind}' for kind in kinds]
+    yield Finding('config folder', 'ok', f'{folder}: {", ".join(counts)}')
 
 
 def ros() -> Iterator[Finding]:
     """Check ROS 2: where it comes from, its middleware, and a message between two processes."""
-    error, output = _child(f'MODULES = {ROS_MODULES!r}\n{_ROS}', 'import rclpy')
-    sources = ros_sources()
-    if error:
-        yield Finding('ROS 2', 'problem', error, _ONE_ROS)
-        return
-    found = json.loads(output.strip().rpartition('\n')[2])
-    wrong = ', '.join(found['wrong'])
-    if not found['path'] and not sources and 'No module' in wrong:
+    wrong, sources = imports(ROS_MODULES), ros_sources()
+    if 'No module' in wrong.get('rclpy', '') and not sources:
         text = 'no rclpy: nodes cannot run, and pad run needs --no-ros; all other commands work'
         advice = 'pip install "ros_pad[ros]", or install ROS 2 from apt and source its setup.bash'
         yield Finding('ROS 2', 'warning', text, advice)
         return
-    if found['path']:
-        yield which_ros(found['path'], sources)
+    if 'rclpy' not in wrong:
+        spec = importlib.util.find_spec('rclpy')
+        yield which_ros(str(spec and spec.origin), sources)
     if wrong:
-        advice = f'pip install "ros_pad[ros]", or rosdep install; {_ONE_ROS}'
-        yield Finding('messages' if found['path'] else 'ROS 2', 'problem', wrong, advice)
+        what = 'ROS 2' if 'rclpy' in wrong else 'messages'
+        text = ', '.join(f'{name} ({error})' for name, error in wrong.items())
+        yield Finding(what, 'problem', text, f'{_INSTALL}; {_ONE_ROS}')
         return
     settings = [
         f'{each}={os.environ[each]}' for each in _DISCOVERY_VARIABLES if each in os.environ
     ]
-    text = ', '.join(settings) or 'domain 0, discovery in the whole subnet'
-    yield Finding('middleware', 'ok', f'{found["rmw"]}; {text}')
+    text = ', '.join(settings) or 'default, domain 0, discovery in the whole subnet'
+    yield Finding('middleware', 'ok', text)
     yield loopback()
 
 
@@ -379,11 +347,8 @@ def loopback(patience: float = LOOPBACK) -> Finding:
 def serial_ports(ports: Sequence[str] | None = None) -> Iterator[Finding]:
     """Check that device files can be opened; None checks those of all serial ports."""
     if ports is None:
-        try:
-            from serial.tools import list_ports
-        except ImportError as error:
-            yield Finding('serial ports', 'problem', str(error), 'pip install pyserial')
-            return
+        from serial.tools import list_ports
+
         ports = sorted(port.device for port in list_ports.comports())
     if not ports:
         yield Finding('serial ports', 'ok', 'none is plugged in')

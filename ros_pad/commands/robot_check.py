@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,9 +19,7 @@ from ros_pad.robots.rotation import Array
 from ros_pad.sensing import Mapping, Readings
 from ros_pad.sensing.checks import Check, Recording, check
 
-SHORTEST, FEWEST = 1.0, 10  # s, readings: less is not checked
-
-_Readings = dict[str, list[tuple[Readings, int]]]  # by topic, with the time of arrival, ns
+_Row = tuple[Readings, int]  # with the time of arrival, ns
 
 
 def findings(options: argparse.Namespace) -> Iterator[Check]:
@@ -43,56 +41,45 @@ def findings(options: argparse.Namespace) -> Iterator[Check]:
         text = f'{about}: its links have no mass, <inertial> with <mass>: the body estimator'
         yield Check('robot', 'problem', f'{text} needs the weight')
     messages, topics = (_recorded if options.bag else _live)(options, mapping, seconds)
-    found: _Readings = defaultdict(list)
+    rows: list[_Row] = []
+    counts: Counter[str] = Counter()
     refused: dict[str, str] = {}
     for topic, message, arrival in messages:
         try:
-            readings = mapping.read(topic, message, arrival)
+            rows.append((mapping.read(topic, message, arrival), arrival))
+            counts[topic] += 1
         except InvalidInput as error:
             refused.setdefault(topic, str(error))
-        else:
-            found[topic].append((readings, arrival))
-    for topic, rows in found.items():
-        yield Check(topic, 'ok', f'{len(rows)} messages')
+    for topic, count in counts.items():
+        yield Check(topic, 'ok', f'{count} messages')
     for topic, text in refused.items():
         yield Check(topic, 'problem', f'messages do not fit the mapping: {text}')
-    yield from silent(mapping, topics, found, refused)
-    for text in mapping.missing:
-        what, _, missing = text.partition(': ')
-        yield Check(what, 'warning', missing)
-    yield from _judged(robot, mapping, found)
-
-
-def silent(
-    mapping: Mapping, topics: dict[str, str], found: _Readings, refused: dict[str, str]
-) -> Iterator[Check]:
-    """Yield the topics without messages; ``topics`` has the type of each that there is."""
-    rows = [each for readings in found.values() for each, _ in readings]
-    efforts = any(each.efforts is not None for each in rows)
-    if efforts and not any(each.forces for each in rows):
+    efforts = any(each.efforts is not None for each, _ in rows)
+    if efforts and not any(each.forces for each, _ in rows):
         yield Check('forces', 'ok', 'from the efforts of the joints: no foot force arrives')
     for source in mapping.sources:
         needed = source.gives & {'gyro', 'accelerometer', 'positions'} or not efforts
-        if needed and source.topic not in {**found, **refused}:
-            same = [name for name, each in topics.items() if each == source.type_name]
+        if needed and source.topic not in {**counts, **refused}:
+            same = [name for name, kind in topics.items() if kind == source.type_name]
             text = f'no message; {source.type_name} is on {", ".join(same) or "no topic"}'
             yield Check(source.topic, 'problem', text)
+    for text in mapping.missing:
+        what, _, missing = text.partition(': ')
+        yield Check(what, 'warning', missing)
+    yield from _judged(robot, mapping, rows)
 
 
-def _judged(robot: Robot, mapping: Mapping, found: _Readings) -> Iterator[Check]:
+def _judged(robot: Robot, mapping: Mapping, rows: list[_Row]) -> Iterator[Check]:
     """Check the readings against one another, where there are enough of them."""
-    rows = [row for readings in found.values() for row in readings]
-    rows.sort(key=lambda row: row[1])
     imu = [row for row in rows if row[0].gyro is not None and row[0].accelerometer is not None]
     joints = [row for row in rows if row[0].positions is not None]
     short = False
     for what, readings in (('imu', imu), ('joints', joints)):
-        length = (readings[-1][1] - readings[0][1]) * 1e-9 if len(readings) > FEWEST else 0.0
-        if length < SHORTEST:
+        length = (readings[-1][1] - readings[0][1]) * 1e-9 if len(readings) > 10 else 0.0
+        if length < 1.0:
             short = True
-            if found:
-                text = f'readings of {length:.3g} s; at least {SHORTEST:g} s are needed'
-                yield Check(what, 'problem', text)
+            if rows:
+                yield Check(what, 'problem', f'readings of {length:.3g} s; 1 s is needed')
     if not short:
         faults = check(_recording(robot, mapping, imu, joints, rows))
         if all(each.what == 'not judged' for each in faults):
@@ -101,34 +88,33 @@ def _judged(robot: Robot, mapping: Mapping, found: _Readings) -> Iterator[Check]
 
 
 def _recording(
-    robot: Robot,
-    mapping: Mapping,
-    imu: list[tuple[Readings, int]],
-    joints: list[tuple[Readings, int]],
-    rows: list[tuple[Readings, int]],
+    robot: Robot, mapping: Mapping, imu: list[_Row], joints: list[_Row], rows: list[_Row]
 ) -> Recording:
     """Return the readings as arrays; the first stamp of the joints is time 0."""
     start = joints[0][0].stamp
 
-    def seconds(stamps: list[int]) -> Array:
-        return np.array([stamp - start for stamp in stamps]) * 1e-9
+    def stamps(part: list[_Row]) -> Array:
+        return np.array([each.stamp - start for each, _ in part]) * 1e-9
+
+    def arrivals(part: list[_Row]) -> Array:
+        return np.array([at - start for _, at in part]) * 1e-9
 
     def column(name: str) -> Array | None:
         values = [getattr(each, name) for each, _ in joints]
         return None if any(each is None for each in values) else np.array(values)
 
-    times = seconds([each.stamp for each, _ in joints])
-    forces = None
-    if any(each.forces for each, _ in rows):
-        forces = np.zeros((len(times), len(robot.legs), 3))  # a foot without readings has none
-        for leg in range(len(robot.legs)):
-            own = sorted((each.stamp, *each.forces[leg]) for each, _ in rows if leg in each.forces)
-            for axis in range(3) if own else ():
-                stamps = seconds([row[0] for row in own])
-                forces[:, leg, axis] = np.interp(times, stamps, [row[1 + axis] for row in own])
+    times, forces = stamps(joints), None
+    for leg in range(len(robot.legs)):
+        own = sorted((row for row in rows if leg in row[0].forces), key=lambda row: row[0].stamp)
+        if own:
+            if forces is None:  # a foot without readings has none
+                forces = np.zeros((len(times), len(robot.legs), 3))
+            columns = np.array([each.forces[leg] for each, _ in own]).T
+            axes = [np.interp(times, stamps(own), values) for values in columns]
+            forces[:, leg] = np.transpose(axes)
     return Recording(
         robot,
-        seconds([each.stamp for each, _ in imu]),
+        stamps(imu),
         np.array([each.gyro for each, _ in imu]),
         np.array([each.accelerometer for each, _ in imu]),
         times,
@@ -138,8 +124,8 @@ def _recording(
         forces,
         mapping.force_axes,
         mapping.force_kind or 'vector',
-        seconds([at for _, at in imu]),
-        seconds([at for _, at in joints]),
+        arrivals(imu),
+        arrivals(joints),
     )
 
 

@@ -26,9 +26,7 @@ from ros_pad.sensing.estimator import LONGEST_STEP, WEIGHT, BodyEstimator, force
 
 Flags = npt.NDArray[np.bool_]
 
-SLOWEST = 194.0  # Hz, rate that is wanted: 200, but for jitter
 CALM = 0.1  # rad/s, of body and joints at rest
-WINDOW = 0.06  # s, over which feet are taken to stand still
 FEWEST = 30  # windows in which pairs of feet stand while the robot moves
 SURE = 6.0  # standard deviations
 
@@ -170,8 +168,8 @@ class Recording:
         return float(np.median(np.diff(self.joint_time)))
 
     def mean(self, values: Array, windows: int = 1) -> Array:
-        """Return means of values (m, ...) over the window that begins with each sample."""
-        span = windows * max(2, round(WINDOW / self._step))
+        """Return means of values (m, ...) over windows of 0.06 s that begin with each sample."""
+        span = windows * max(2, round(0.06 / self._step))
         sums = np.cumsum(values, axis=0)
         return (sums[span:] - sums[:-span] + 0.5 * (values[:-span] - values[span:])) / span
 
@@ -282,7 +280,7 @@ def _rates(recording: Recording) -> list[Check]:
     for what, times in (('imu', recording.imu_time), ('joints', recording.joint_time)):
         steps = np.diff(times)
         rate = 1.0 / max(float(np.median(steps)), 1e-9)
-        if rate < SLOWEST:
+        if rate < 194.0:  # 200, but for jitter
             text = f'{rate:.0f} samples a second, 200 to 500 are wanted'
             found.append(Check(what, 'warning', text))
         gaps = steps > max(LONGEST_STEP, 3.0 / rate)
@@ -467,26 +465,18 @@ def _forces(recording: Recording) -> list[Check]:
     return [Check(what, 'problem', text) for text in found]
 
 
-def _pushes(recording: Recording) -> tuple[Array, Array]:
-    """Return the total force along the ground, and mass times specific force, (k, 2), N."""
-    forces = recording.ground_forces
-    assert forces is not None
-    total = recording.mean(forces.sum(1)[:, :2], 3)
-    wanted = recording.robot.mass * recording.mean(recording.pull[:, :2], 3)
-    moves = np.flatnonzero(~recording.rests[: len(total)])
-    moves = moves[:: max(1, (len(forces) - len(total)) // 9)]
-    total, wanted = total[moves], wanted[moves]
-    return (total - total.mean(0), wanted - wanted.mean(0)) if len(moves) else (total, wanted)
-
-
 def _horizontal(recording: Recording) -> list[Check]:
     """Check that foot forces accelerate the body as the accelerometer shows: axes about z."""
     forces = recording.ground_forces
     if forces is None or recording.force_kind != 'vector' or not np.any(forces[..., :2]):
         return []
-    total, wanted = _pushes(recording)
-    if len(total) < FEWEST:
+    total = recording.mean(forces.sum(1)[:, :2], 3)  # N
+    wanted = recording.robot.mass * recording.mean(recording.pull[:, :2], 3)
+    moves = np.flatnonzero(~recording.rests[: len(total)])
+    moves = moves[:: max(1, (len(forces) - len(total)) // 9)]
+    if len(moves) < FEWEST:
         return []
+    total, wanted = (each[moves] - each[moves].mean(0) for each in (total, wanted))
     turn = _turn(np.asarray(np.linalg.lstsq(total, wanted, rcond=None)[0], dtype=float))
     before, after = _sizes(total - wanted), _sizes(total @ turn - wanted)
     if after.mean() >= 0.7 * before.mean() or _sure(before, after) <= SURE:

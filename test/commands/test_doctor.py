@@ -9,7 +9,6 @@ import os
 import pathlib
 import re
 import shutil
-import subprocess
 import sys
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -36,50 +35,16 @@ def one(findings: Any) -> Finding:
     return finding
 
 
-@pytest.mark.parametrize(
-    ('version', 'status'),
-    [((3, 10, 4), 'problem'), ((3, 11, 0), 'ok')],
-)
-def test_python(version: tuple[int, ...], status: str):
-    assert one(doctor.python(version)).status == status
-
-
-# Program of a child process in which NumPy is missing, as if it was not installed.
-WITHOUT = """
-import sys
-
-class Missing:
-    def find_spec(self, name, path=None, target=None):
-        if name.split('.')[0] == 'numpy':
-            raise ModuleNotFoundError(f'No module named {name!r}', name=name)
-
-sys.meta_path.insert(0, Missing())
-from ros_pad import cli
-sys.exit(cli.main(['doctor', '--json']))
-"""
-
-
-def findings_of(code: str, **environment: str) -> tuple[int, dict[str, dict[str, str]]]:
-    child = subprocess.run(
-        [sys.executable, '-c', code],
-        cwd=ROOT,
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    report = json.loads(child.stdout)
-    found = {each['what']: each for each in report['findings']}
-    assert report['problems'] == sum(each['status'] == 'problem' for each in found.values())
-    return child.returncode, found
-
-
-@pytest.mark.slow
-def test_a_missing_package_is_named_and_the_doctor_goes_on():
-    # An unknown middleware stops the check of ROS early: its processes would not miss the package.
-    status, found = findings_of(WITHOUT, RMW_IMPLEMENTATION='rmw_of_no_one')
-    assert status == 1
-    assert found['packages']['status'] == 'problem'
+def test_a_missing_package_is_named_and_the_doctor_goes_on(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / 'numpy.py').write_text('raise ModuleNotFoundError("No module named \'numpy\'")')
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for name in ('extras', 'ros', 'config_folder'):
+        monkeypatch.setattr(doctor, name, lambda: iter(()))
+    assert cli.main(['doctor', '--json']) == 1
+    found = {each['what']: each for each in json.loads(capsys.readouterr().out)['findings']}
+    assert (found['Python']['status'], found['packages']['status']) == ('ok', 'problem')
     assert 'numpy (ModuleNotFoundError' in found['packages']['found']
     assert 'pip install' in found['packages']['advice']
     assert found['logs']['status'] == 'ok'  # the last check still runs
@@ -100,9 +65,9 @@ def test_extras_that_cannot_be_imported_say_why(
     monkeypatch.setitem(doctor.EXTRAS, 'absent_pad', ('mesh', 'nothing'))
     broken, crashing, whole, absent = doctor.extras([*modules, 'absent_pad'])
     assert (broken.status, crashing.status, absent.status) == ('warning',) * 3
-    assert 'status 1: OSError: libGL.so.1: cannot open' in broken.found
+    assert 'OSError: libGL.so.1: cannot open' in broken.found
     assert 'ends with status -6' in crashing.found
-    assert absent.found == 'not installed: nothing' and 'ros_pad[mesh]' in absent.advice
+    assert "No module named 'absent_pad'" in absent.found and 'ros_pad[mesh]' in absent.advice
     assert (whole.status, whole.found) == ('ok', 'nothing')
 
 
@@ -117,16 +82,16 @@ def test_config_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
     monkeypatch.setattr('ros_pad.configuration.__file__', str(tmp_path / 'a' / 'b.py'))
     monkeypatch.setattr(sys, 'prefix', str(tmp_path))
     monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
-    finding = one(doctor.config_folder())
-    assert (finding.status, str(tmp_path) in finding.found) == ('problem', True)
-    assert 'setup.bash' in finding.advice
+    finding = one(doctor.tried(doctor.config_folder))
+    assert (finding.what, finding.status) == ('config folder', 'problem')
+    assert str(tmp_path) in finding.found
 
 
 def test_without_ros_it_lists_what_still_works(
     tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ):
     (tmp_path / 'rclpy.py').write_text('raise ModuleNotFoundError("No module named \'rclpy\'")')
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(doctor, 'ros_sources', dict)
     finding = one(doctor.ros())
     assert finding.status == 'warning'
@@ -138,7 +103,7 @@ def test_wheels_that_cannot_be_loaded_are_a_problem(
     tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ):
     (tmp_path / 'rclpy.py').write_text('raise ImportError("librcl.so: cannot open")')
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
     finding = one(doctor.ros())
     assert finding.status == 'problem'
     assert 'librcl.so' in finding.found and 'one ROS 2 at a time' in finding.advice
@@ -249,18 +214,16 @@ def test_folders_that_cannot_be_written(tmp_path: pathlib.Path, monkeypatch: pyt
 def test_the_command_prints_all_and_fails_on_a_problem_alone(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    monkeypatch.setenv('COLUMNS', '70')
     found = [
         Finding('Python', 'ok', '3.12'),
-        Finding('mujoco', 'warning', 'not here: ' + 'word ' * 30, 'pip install "ros_pad[mujoco]"'),
+        Finding('mujoco', 'warning', 'not here', 'pip install "ros_pad[mujoco]"'),
     ]
     monkeypatch.setattr(doctor, 'examine', lambda *_: iter(found))
     assert cli.main(['doctor']) == 0
     shown = capsys.readouterr().out
-    assert re.match(r'ok +Python: 3.12\nwarning +mujoco: not here: word', shown)
+    assert re.match(r'ok +Python: 3.12\nwarning +mujoco: not here\n', shown)
     assert '-> pip install "ros_pad[mujoco]"' in shown
     assert 'problems: 0, warnings: 1' in shown
-    assert max(map(len, shown.splitlines())) <= 70
     found.append(Finding('logs', 'problem', 'full', 'make room'))
     assert cli.main(['doctor', '--json']) == 1
     values = json.loads(capsys.readouterr().out)
