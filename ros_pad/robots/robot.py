@@ -567,10 +567,7 @@ def _links(table: Table) -> tuple[list[Joint], list[float]]:
 
 def _hip(table: Table, leg: str | int) -> tuple[Array, Array]:
     """Read where a leg sits, and by what the places along it are multiplied to mirror them."""
-    key: str = leg  # type: ignore[assignment]  # YAML has numbers as keys, too
-    if not isinstance(leg, (str, int)) or isinstance(leg, bool):
-        raise ConfigError(f'{table.origin}: {leg!r} is not allowed: a name or number is needed')
-    with table.table(key) as row:
+    with table.table(leg) as row:  # type: ignore[arg-type]  # YAML has numbers as keys, too
         bearing = row.number('bearing', 'rad', -7.0, 7.0, default=0.0)
         hip = transform(_place(row, 'at'), from_rpy((0.0, 0.0, bearing)))
         side = row.choice('side', ('left', 'right'), default='left')

@@ -12,20 +12,9 @@ from ros_pad.configuration import instance, number
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Chains, Kinematics, Robot
 from ros_pad.robots.rotation import Array, cross, quaternion, rotation, skew
+from ros_pad.sensing import motion
 from ros_pad.sensing.body_filter import GATE, GRAVITY, BodyFilter, Flags
-from ros_pad.sensing.motion import (
-    Body,
-    BodyEstimate,
-    Checks,
-    Doubts,
-    Feet,
-    FootMotion,
-    Given,
-    Length,
-    Rest,
-    Sample,
-    checked,
-)
+from ros_pad.sensing.motion import BodyEstimate, FootMotion, Sample, checked
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
 from ros_pad.sensing.settings import SETTINGS
 from ros_pad.sensing.slip_window import SlipWindow
@@ -145,11 +134,11 @@ class BodyEstimator:
         self._robot = robot
         number('radius_error', radius_error, '(share)', 0.0, 1.0)
         number('length_error', length_error, '(share)', 0.0, 0.5)
-        self._given = Given(
-            gyro_noise, accelerometer_noise, encoder_noise, velocity_noise, force_noise,
-            accelerometer_bias, contact_share, window, rate, force_axes,
-            radius_error * robot.foot_radius, length_error, rejection,
-        )  # fmt: skip
+        self._given = motion.Given(
+            *(gyro_noise, accelerometer_noise, encoder_noise, velocity_noise, force_noise),
+            *(accelerometer_bias, contact_share, window, rate, force_axes),
+            *(radius_error * robot.foot_radius, length_error, rejection),
+        )
         for setting in SETTINGS:
             if setting.name != 'forces':
                 setting.accept(getattr(self._given, setting.name))
@@ -158,7 +147,7 @@ class BodyEstimator:
         to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
         hips = np.concatenate([robot.hips, np.ones((len(robot.legs), 1))], axis=1)
         load = robot.mass * WEIGHT / (0.5 * len(robot.legs))
-        self._body = Body(errors, to_imu, (hips @ to_imu.T)[:, :3], load)
+        self._body = motion.Body(errors, to_imu, (hips @ to_imu.T)[:, :3], load)
         self._reset()
 
     def _reset(self) -> None:
@@ -172,17 +161,17 @@ class BodyEstimator:
         )
         self._time = math.nan
         self._step = 0.0  # the last one, s
-        self._feet = Feet(legs)
-        self._doubts = Doubts(RECOVERY)
-        self._checks = Checks(
+        self._feet = motion.Feet(legs)
+        self._doubts = motion.Doubts(RECOVERY)
+        self._checks = motion.Checks(
             Repeats(given.gyro_noise, given.velocity_noise),
             Joints(robot.joint_names),
             Legs(robot),
             Delay(given.gyro_noise),
             Unloaded(robot.legs, self._body.load),
         )
-        self._length = Length()
-        self._rests = Rest()
+        self._length = motion.Length()
+        self._rests = motion.Rest()
         self._pull = WEIGHT  # mean size of the specific force, m/s²
 
     def update(
