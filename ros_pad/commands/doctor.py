@@ -18,8 +18,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
-import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -302,45 +300,37 @@ def which_ros(path: str, sources: dict[str, str]) -> Finding:
 
 def loopback(patience: float = LOOPBACK) -> Finding:
     """Send a message from one process to another, within ``patience`` s once both have started."""
-    words = [f'/ros_pad_doctor_{uuid.uuid4().hex}', uuid.uuid4().hex]
-    words += ['--seconds', str(STARTING + patience)]
-    children = [
-        subprocess.Popen(
-            [sys.executable, '-m', 'ros_pad.nodes.loopback', end, *words],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))},
-        )
-        for end in ('subscriber', 'publisher')
-    ]  # fmt: skip
-    # A process may hang without output, for example at a lock that a killed process has left.
-    limit = threading.Timer(STARTING, lambda: [*map(subprocess.Popen.kill, children)])
-    limit.start()
+    start = [sys.executable, '-m', 'ros_pad.nodes.loopback']
+    words = [f'/ros_pad_doctor_{uuid.uuid4().hex}', uuid.uuid4().hex, '--seconds']
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))}
+    publisher = subprocess.Popen(
+        [*start, 'publisher', *words, f'{STARTING + patience}'],
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        env=environment,
+    )  # fmt: skip
+    try:
+        heard = subprocess.run(
+            [*start, 'subscriber', *words, f'{patience}'], stdin=subprocess.DEVNULL,
+            capture_output=True, text=True, env=environment, timeout=STARTING + patience,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:  # at a lock that a killed process has left, for example
+        text = f'a node does not start within {STARTING:g} s'
+        return Finding('loopback', 'problem', text, f'{_DISCOVERY}; {_ONE_ROS}')
+    finally:
+        publisher.terminate()  # so that it leaves nothing in shared memory
+        try:
+            publisher.wait(5.0)
+        except subprocess.TimeoutExpired:
+            publisher.kill()
+            publisher.wait()
+    if heard.returncode == 0:
+        text = f'a message went from process to process within {patience:g} s'
+        return Finding('loopback', 'ok', text)
+    if 'ready' not in heard.stdout:
+        text = f'a node does not start: {_last_line(heard.stderr)}'
+        return Finding('loopback', 'problem', text, f'{_DISCOVERY}; {_ONE_ROS}')
     text = f'no message from one process to another within {patience:g} s: separate nodes do not'
     text += ' find one another (pad run without --live does not need it)'
-    try:
-        for child in children:
-            assert child.stdout is not None and child.stderr is not None
-            if child.stdout.readline() != 'ready\n':
-                child.terminate()
-                error = f'a node does not start: {_last_line(child.stderr.read())}'
-                return Finding('loopback', 'problem', error, f'{_DISCOVERY}; {_ONE_ROS}')
-        limit.cancel()
-        started = time.monotonic()
-        if children[0].wait(patience) == 0:
-            text = f'a message went from process to process in {time.monotonic() - started:.1f} s'
-            return Finding('loopback', 'ok', f'{text} (limit {patience:g} s)')
-    except subprocess.TimeoutExpired:
-        pass
-    finally:
-        limit.cancel()
-        for child in children:
-            child.terminate()  # so that it leaves nothing in shared memory
-        for child in children:
-            try:
-                child.wait(5.0)
-            except subprocess.TimeoutExpired:
-                child.kill()
-                child.wait()
     return Finding('loopback', 'problem', text, _DISCOVERY)
 
 

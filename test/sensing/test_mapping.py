@@ -13,7 +13,7 @@ from ros_pad import configuration
 from ros_pad.bags import BagReader
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.sensing import BodyEstimator, Mapping
+from ros_pad.sensing import Mapping
 from studies.sensing import layouts
 
 GO2 = Robot.load('go2')
@@ -53,94 +53,49 @@ def readings(tmp_path, name, robot, *streams):
     return mapping, found
 
 
-def estimates(found, robot, **settings):
-    """Return the estimates of readings, paired by their stamps."""
-    estimator = BodyEstimator(robot, **settings)
-    samples = {}
-    for each in found:
-        fields = {key: value for key, value in each._asdict().items() if value is not None}
-        forces = fields.pop('forces')
-        sample = samples.setdefault(fields.pop('stamp'), {'forces': {}})
-        sample.update(fields)
-        sample['forces'].update(forces)
-    first = min(samples)
-    made = []
-    for stamp, sample in sorted(samples.items()):
-        forces = [sample['forces'][leg] for leg in sorted(sample['forces'])]
-        made.append(
-            estimator.update(
-                (stamp - first) / 1e9,
-                sample['gyro'],
-                sample['accelerometer'],
-                sample['positions'],
-                sample['velocities'],
-                np.array(forces) if forces else None,
-                sample.get('efforts'),
-            )
-        )
-    return made
+def column(found, kind):
+    """Return the readings of one kind, of each moment of the log."""
+    values = [getattr(each, kind) for each in found if getattr(each, kind) is not None]
+    assert len(values) == len(log().time) == 750
+    return np.array(values)
 
 
-def from_arrays(robot, gyro, accelerometer, q, dq, forces=None, efforts=None, **settings):
-    """Return the estimates from arrays themselves."""
-    estimator = BodyEstimator(robot, **settings)
-    return [
-        estimator.update(
-            round(time * 1e9) / 1e9,
-            gyro[i],
-            accelerometer[i],
-            q[i],
-            dq[i],
-            None if forces is None else forces[i],
-            None if efforts is None else efforts[i],
-        )
-        for i, time in enumerate(log().time.tolist())
-    ]
+def forces(found):
+    """Return the forces of all feet, (moments, 4, 3), N."""
+    rows = [[each.forces[leg] for each in found if leg in each.forces] for leg in range(4)]
+    return np.array(rows).swapaxes(0, 1)
 
 
-def same(found, expected, rounding=0.0):
-    def equal(one, other):
-        return np.abs(one - other).max() <= rounding
-
-    assert len(found) == len(expected) == 750
-    for one, other in zip(found, expected, strict=True):
-        assert equal(one.position, other.position)
-        assert equal(one.velocity, other.velocity)
-        assert one.doubt == other.doubt
-        for foot, twin in zip(one.feet, other.feet, strict=True):
-            assert equal(foot.slip_velocity, twin.slip_velocity)
-            assert equal(foot.force, twin.force)
-
-
-def test_joint_states_and_wrenches_give_the_estimate_of_the_arrays(tmp_path):
+def test_joint_states_and_wrenches(tmp_path):
     streams = [layouts.imu(log()), layouts.joint_states(log(), GO2.joint_names)]
     mapping, found = readings(tmp_path, 'default', GO2, *streams, layouts.wrenches(log(), GO2))
-    assert mapping.missing == ()
-    expected = from_arrays(
-        GO2,
-        log().gyro,
-        log().accelerometer,
-        log().joint_positions,
-        log().joint_velocities,
-        log().foot_forces,
-    )
-    same(estimates(found, GO2, force_axes=mapping.force_axes), expected, 1e-9)
+    assert (mapping.missing, mapping.force_axes, mapping.force_kind) == ((), 'foot', 'vector')
+    for kind, expected in (
+        ('gyro', log().gyro),
+        ('accelerometer', log().accelerometer),
+        ('positions', log().joint_positions),
+        ('velocities', log().joint_velocities),
+        ('efforts', log().efforts),
+    ):
+        assert column(found, kind) == pytest.approx(expected, abs=1e-9)
+    turns = np.array([GO2.kinematics(q).rotations for q in log().joint_positions])
+    in_base = (turns @ forces(found)[..., None])[..., 0]
+    assert in_base == pytest.approx(log().foot_forces, abs=1e-9)
+    stamps = [each.stamp for each in found if each.gyro is not None]
+    assert np.diff(stamps) == pytest.approx(4e6, abs=1.0)
 
 
 def test_low_state_of_a_go2(tmp_path):
     mapping, found = readings(tmp_path, 'go2', GO2, layouts.low_state(log(), GO2))
     assert found[0].stamp == layouts.START
-    arrays = map(
-        as_float32,
-        (
-            log().gyro,
-            log().accelerometer,
-            log().joint_positions,
-            log().joint_velocities,
-        ),
-    )
-    expected = from_arrays(GO2, *arrays, efforts=as_float32(log().efforts))
-    same(estimates(found, GO2), expected)
+    for kind, expected in (
+        ('gyro', log().gyro),
+        ('accelerometer', log().accelerometer),
+        ('positions', log().joint_positions),
+        ('velocities', log().joint_velocities),
+        ('efforts', log().efforts),
+    ):
+        assert np.array_equal(column(found, kind), as_float32(expected))
     assert any(each.startswith('force: ') for each in mapping.missing)
 
 
@@ -148,27 +103,15 @@ def test_a_go2_by_its_feet(tmp_path):
     mapping, found = readings(tmp_path, 'go2_sport', FEET, layouts.sport_state(log(), GO2))
     assert 'friction: unobservable, the force has one axis' in mapping.missing
     pairs = [layouts.feet_in_body(GO2, log(), tick) for tick in range(len(log().time))]
+    places, speeds = (as_float32(np.array(part)) for part in zip(*pairs, strict=True))
     hips = np.array(((0.1934, 0.142), (0.1934, -0.142), (-0.1934, 0.142), (-0.1934, -0.142)))
-    places = as_float32(np.array([place for place, _ in pairs]))
-    places[..., :2] -= hips
-    forces = np.zeros_like(log().foot_forces)
-    forces[..., 2] = np.round(log().foot_forces[..., 2])
-    settings = {'encoder_noise': 5e-4, 'velocity_noise': 0.01}
-    expected = from_arrays(
-        FEET,
-        as_float32(log().gyro),
-        as_float32(log().accelerometer),
-        places.reshape(-1, 12),
-        as_float32(np.array([speed for _, speed in pairs])).reshape(-1, 12),
-        forces,
-        **settings,
-    )
-    made = estimates(found, FEET, **settings)
-    same(made, expected, 1e-9)  # 0.0465 + 0.0955 is not quite 0.142
+    expected = places - np.pad(hips, ((0, 0), (0, 1)))
+    assert column(found, 'positions') == pytest.approx(expected.reshape(-1, 12), abs=1e-9)
+    assert np.array_equal(column(found, 'velocities'), speeds.reshape(-1, 12))
+    assert forces(found)[..., 2] == pytest.approx(np.round(log().foot_forces[..., 2]))
+    assert not forces(found)[..., :2].any()
     # The robot with joints in m has its feet where the messages have them.
-    q = np.array(found[5].positions)
-    assert FEET.foot_positions(q) == pytest.approx(pairs[5][0], abs=1e-6)
-    assert all(foot.force[:2] == pytest.approx([0.0, 0.0], abs=9.0) for foot in made[400].feet)
+    assert FEET.foot_positions(found[5].positions) == pytest.approx(pairs[5][0], abs=1e-6)
 
 
 def test_feet_of_spot_with_an_imu_of_its_owner(tmp_path):
