@@ -356,9 +356,10 @@ def _check_sizes(robot: Robot) -> None:
     away = np.linalg.norm(robot.hips, axis=1).round(6).tolist()
     for leg, joints, length, hip in zip(robot.legs, robot.chains.legs, lengths, away, strict=True):
         number(f'leg {leg}: distance of the hip from the base', hip, _METRES, 0.0, LONGEST)
-        shortest = 0.0 if any(joint.slides for joint in joints) else 5e-3
-        number(f'leg {leg}: length', length, _METRES, shortest, LONGEST)
-        number('foot_radius', robot.foot_radius, _METRES, 0.0, length)
+        slides = any(joint.slides for joint in joints)
+        number(f'leg {leg}: length', length, _METRES, 0.0 if slides else 5e-3, LONGEST)
+        if not slides:
+            number('foot_radius', robot.foot_radius, _METRES, 0.0, length)
 
 
 class _Trunk(NamedTuple):
