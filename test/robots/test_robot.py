@@ -174,6 +174,7 @@ def test_an_own_gait_and_fewer_legs(tmp_path):
         ('<mass value="0.7"/>', '<mass value="-1"/>', 'at least 0 kg'),
         ('<joint name="c_j3" type="revolute">', '<joint name="c_j3" type="fixed">', '2 and 3'),
         ('name="imu_joint" type="fixed"', 'name="imu_joint" type="revolute"', 'moves'),
+        ('xyz="0.2 0.1 0.01"', 'xyz="200 100 10"', 'leg a_foot: distance of the hip .* 5 m'),
         ('<limit lower="-3" upper="3"', '<limit lower="3" upper="-3"', 'lower = 3.0 .* most -3'),
         ('<axis xyz="1 2 -1"/>', '<axis xyz="1 2 -1"/><mimic joint="b_j1"/>', 'mimic .*b_j1'),
     ],
