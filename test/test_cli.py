@@ -344,7 +344,7 @@ def environment():
 
 
 def pad(*arguments):
-    return [sys.executable, '-m', 'ros_pad.cli', *arguments]
+    return [sys.executable, '-m', 'ros_pad', *arguments]
 
 
 def test_a_run_on_nodes_is_recorded_and_reported(tmp_path, environment):

@@ -1,5 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad chart``: run a work-precision study, which measures time and error of each method."""
+"""Measure time, error and failures of every method on this machine.
+
+This runs python -m studies NAME, which needs a checkout of ros_pad and writes table, JSON and
+pictures.
+
+example:
+  pad chart contact
+"""
 
 from __future__ import annotations
 
@@ -13,11 +20,7 @@ CHARTS = ('capillary', 'contact', 'estimator', 'meniscus', 'stability', 'walk')
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Measure time, error and failures of every method on this machine; write table, JSON and '
-        'pictures. This runs python -m studies NAME, which needs a checkout of ros_pad.'
-    )
-    part = add_command(commands, 'chart', run, text, 'pad chart contact')
+    part = add_command(commands, 'chart', run, __doc__)
     add = part.add_argument
     add('name', choices=CHARTS, help='study to run; they take from 10 s to two minutes')
     add('--out', help='folder, in which files are replaced (default: a new one in runs)', **FOLDER)

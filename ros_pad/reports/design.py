@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,18 +30,19 @@ def draw(path: str | os.PathLike[str], designs: Sequence[Design]) -> None:
     def figure() -> Figure:
         drawn = Figure(figsize=(WIDE, 3.2), layout='constrained')
         loads, heights = drawn.subplots(1, 2)
-        first, r = designs[0], np.array([each.pad.radius for each in designs])
+        first, radii = designs[0], np.array([each.pad.radius for each in designs])
         reach = np.array([each.reachable_load for each in designs])
         reach[reach <= 0.0] = np.nan  # a logarithmic axis cannot show a load of zero
-        loads.plot(1e3 * r, reach, color=BLUE, lw=1.8, label=f'force limit {first.criterion}')
+        look: dict[str, Any] = {'color': BLUE, 'marker': 'o', 'ms': 3.5}
+        loads.plot(1e3 * radii, reach, label=f'force limit {first.criterion}', **look)
         loads.axhline(first.load, color=BLACK, lw=1.0, ls=':', label='load')
         loads.set(yscale='log', ylabel='load of the foot, N', title='(a) what a sole carries')
         # Use ideal cells: the cells of a design vary, because its number of pads is rounded.
-        heights.plot(1e3 * r, 1e3 * rise_height(r), color=BLUE, lw=1.8, label='height of rise')
-        heights.plot(1e3 * r, 3e3 * r, color=BLACK, lw=1.0, ls=':', label='gap full')
+        heights.plot(1e3 * radii, 1e3 * rise_height(radii), label='height of rise', **look)
+        heights.plot(1e3 * radii, 3e3 * radii, color=BLACK, lw=1.0, ls=':', label='gap full')
         heights.set(ylabel='height of rise, mm', title='(b) liquid between the domes')
         for axes in (loads, heights):
-            axes.set(xlim=(0.0, 2.5), xlabel='radius of the pads, mm')
+            axes.set(xlim=(0.0, 2.6), xlabel='radius of the pads, mm')
             axes.legend()
         return drawn
 

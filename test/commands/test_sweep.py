@@ -140,7 +140,7 @@ class Child:
         own, other = pty.openpty()
         termios.tcsetwinsize(other, (24, 120))
         self.process = subprocess.Popen(
-            [sys.executable, '-m', 'ros_pad.cli', *arguments], stdout=other, stderr=other
+            [sys.executable, '-m', 'ros_pad', *arguments], stdout=other, stderr=other
         )
         os.close(other)
         self._reader = threading.Thread(target=self._read, args=[own], daemon=True)
