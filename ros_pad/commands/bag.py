@@ -4,7 +4,7 @@
 info: list topics with types, numbers of messages, rates, gaps and losses; repair: copy the
 messages that can be read from an incomplete bag (recorder killed, disk full) into a new bag.
 
-examples:
+For example:
   pad bag info runs/hexapod_patches_adaptive_seed0/bag
   pad bag repair my_trial --out my_trial_repaired
 """

@@ -4,7 +4,7 @@
 This runs python -m studies NAME, which needs a checkout of ros_pad and writes table, JSON and
 pictures.
 
-example:
+For example:
   pad chart contact
 """
 
@@ -29,5 +29,4 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the work-precision study; return the exit status."""
-    words = ['--out', str(options.out)] if options.out else []
-    return run_study(options.name, *words, *(['--json'] if options.json else []))
+    return run_study(options.name, out=options.out, json=options.json)

@@ -4,7 +4,7 @@
 One of --sole-radius and --foot is needed. With --material, or a foot whose pads name one: a table
 of pads of each material and thickness, with intervals from what is unsure of the materials.
 
-examples:
+For example:
   pad design --load 7 --foot large37 --figure design.png
   pad design --load 2 --sole-radius 0.017 --material all --thickness 0.2e-3 0.4e-3
 """

@@ -66,7 +66,7 @@ With --robot, look at the sensors of a robot instead, live or in a bag: what is
 missing, rates, stamps, units, axes and signs of IMU, joints and foot forces.
 Let the robot stand for two seconds, then walk some steps."""
 _EXAMPLES = """\
-examples:
+For example:
   pad doctor
   pad doctor --json
   pad doctor --robot go2 --mapping go2

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Emulate a pressure regulator on a pseudo-terminal until Ctrl-C; print its path.
 
-example:
+For example:
   pad emulate alicat --unit-ids ABCDEF --link /tmp/regulators --fault silence:10:12
 """
 

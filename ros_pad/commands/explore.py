@@ -4,7 +4,7 @@
 Dome, sole, grip, force limit and switching time follow the sliders. The page is served to this
 machine alone, until Ctrl-C.
 
-examples:
+For example:
   pad explore
   pad explore small217
 """

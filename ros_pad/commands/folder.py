@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 from ros_pad.configuration import choice
 from ros_pad.errors import InvalidInput, PadError
@@ -29,6 +31,16 @@ def new_folder(wanted: pathlib.Path | None, name: str) -> pathlib.Path:
             ) from error
         else:
             return folder
+
+
+@contextmanager
+def kept_if_filled(folder: pathlib.Path) -> Iterator[None]:
+    """Remove a folder that is empty after the block, so that its name can be used again."""
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def refuse_existing(option: str, path: pathlib.Path | None) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """List the scenes.
 
-example:
+For example:
   pad scenes
 """
 
