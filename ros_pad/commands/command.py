@@ -98,12 +98,13 @@ def complain(error: object, status: int, program: str = 'pad') -> int:
 
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> None:
-    """Print a table; the first ``texts`` columns are aligned left, the others right."""
+    """Print a table; the first ``texts`` columns and those without a head are aligned left."""
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    left = [place < texts or not name for place, name in enumerate(head)]
     for row in (head, *rows):
         cells = [
-            cell.ljust(width) if column < texts else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+            cell.ljust(width) if is_text else cell.rjust(width)
+            for cell, width, is_text in zip(row, widths, left, strict=True)
         ]
         print('  '.join(cells).rstrip())
 
