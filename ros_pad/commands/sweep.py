@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run every combination of scenes, policies, seeds and parameters, without ROS.
+r"""Run every combination of scenes, policies, seeds and parameters, without ROS.
 
 It runs on all cores or on a Dask cluster, and writes trials.csv, a picture with confidence
 intervals, and a page. A sweep that was stopped or killed continues when the same command is given
 again with --out and its folder; seeds, policies, scenes and values may be added.
 
 For example:
-  pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 \\
+  pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 \
       --set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing
 """
 

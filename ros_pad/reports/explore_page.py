@@ -1,16 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of ``pad explore``, served to this machine alone.
-
-A change of an input is computed beside the server; changes that come meanwhile are answered
-together, by the last of them. Nothing is loaded from elsewhere.
-"""
+"""The page of ``pad explore``, served to this machine alone; nothing is loaded from elsewhere."""
 
 from __future__ import annotations
 
 import asyncio
 import html
 import math
-from collections.abc import Callable
 from typing import Any
 
 from ros_pad import configuration
@@ -34,19 +29,17 @@ from ros_pad.reports.explore import (
 from ros_pad.reports.style import BLUE, VERMILION
 
 HOST = '127.0.0.1'
-PATIENCE = 0.1
-"""Time after which old numbers are shown pale while new ones are computed, s."""
 _GROUPS = {
     'Pads': ('material', 'pads', 'radius', 'stiffness', 'thickness', 'sole_radius', 'criterion'),
     'Air': ('supply', 'pressure', 'bore', 'hose'),
     'Ground': ('load', 'liquid', 'film', 'stand', 'roughness'),
 }
 _CHOICES = {'material': 'Material', 'criterion': 'Criterion of the limit', 'liquid': 'Liquid'}
-_CSS = f"""{explore_drawings.STYLE}
+_CSS = f"""
 body {{ font: 15px/1.45 system-ui, sans-serif; }}
 .nicegui-content {{ padding: 0; display: block; }}
 .explore {{ display: grid; grid-template-columns: 21rem minmax(0, 1fr); gap: 0 1.5rem;
-  max-width: 1500px; margin: 0 auto; padding: 1rem 1.25rem; }}
+  grid-template-rows: auto auto 1fr; max-width: 1500px; margin: 0 auto; padding: 1rem 1.25rem; }}
 .top {{ grid-column: 1 / -1; display: flex; gap: 1rem; align-items: center; }}
 .top > :first-child {{ margin-right: auto; }}
 h1 {{ font-size: 1.35rem; font-weight: 650; line-height: 1.2; margin: 0; }}
@@ -64,7 +57,8 @@ dl {{ margin: 0; font-size: 0.86rem; }}
 dl div {{ display: flex; justify-content: space-between; border-bottom: 1px solid #dcdfe4; }}
 dd {{ margin: 0; font-variant-numeric: tabular-nums; }}
 .note {{ font-size: 0.82rem; margin-top: 0.8rem; }}
-.stale {{ opacity: 0.35; }}
+.figures svg {{ width: 100%; height: auto; }}
+.stale {{ opacity: 0.35; transition: opacity 0s 0.1s; }}
 """
 
 
@@ -109,49 +103,6 @@ def serve(foot: Foot, port: int, browser: bool) -> None:
     )
 
 
-class Latest:
-    """Computes in a thread, and again if that was asked for meanwhile: once, however often.
-
-    Parameters
-    ----------
-    compute : callable
-        Returns an answer to what is true when it begins; called in a thread.
-    show : callable
-        Called with the answer, in the thread of the event loop.
-    wait : callable
-        Called there with words if an answer takes longer than :data:`PATIENCE`, or fails.
-    """
-
-    def __init__(
-        self,
-        compute: Callable[[], Any],
-        show: Callable[[Any], None],
-        wait: Callable[[str], None],
-    ) -> None:
-        self._compute, self._show, self._wait = compute, show, wait
-        self._asked = False
-        self._task: asyncio.Task[None] | None = None
-
-    def ask(self) -> None:
-        """Ask for an answer to what is true from now on."""
-        self._asked = True
-        if self._task is None or self._task.done():
-            self._task = asyncio.get_running_loop().create_task(self._work())
-
-    async def _work(self) -> None:
-        while self._asked:
-            self._asked = False
-            thread = asyncio.ensure_future(asyncio.to_thread(self._compute))
-            if not (await asyncio.wait({thread}, timeout=PATIENCE))[0]:
-                self._wait('computing …')
-            try:
-                self._show(await thread)
-            except Exception as error:
-                self._wait(f'no answer: {error}')
-                if not self._asked:
-                    raise
-
-
 class Page:
     """One opened page: its inputs, and the answer that it shows.
 
@@ -166,8 +117,9 @@ class Page:
 
         self._ui: Any = ui
         self._inputs = inputs
-        self._latest = Latest(lambda: answer(self._inputs), self._show, self._set_pale)
-        self._answers = 0
+        self._answered: Inputs | None = None
+        self._one = asyncio.Lock()
+        self._count = 0
         self._controls: dict[str, Any] = {}
         self._remarks: dict[str, Any] = {}
 
@@ -199,8 +151,9 @@ class Page:
             with ui.element('section').classes('answer').props('aria-label="Numbers"') as numbers:
                 self._numbers = ui.html(sanitize=False)
                 ui.html(f'<p class="note">{NOTE}</p>', sanitize=False)
-        self._pale = both, numbers
-        self._latest.ask()
+        self._answers = both, numbers
+        # The page waits for no answer: NiceGUI gives up on one that takes long.
+        ui.timer(0.0, self.answer, once=True)
 
     def _number(self, field: Field) -> None:
         """Make a number and its slider, which move one another."""
@@ -214,11 +167,11 @@ class Page:
             box.set_value(float(event.args))
             sliding = False
 
-        def changed(event: Any) -> None:
+        async def changed(event: Any) -> None:
             number = event.value
             if not sliding:
                 place(number)
-            self._change(field.name, _si(field, number))
+            await self.change(field.name, _si(field, number))
 
         def place(number: float | None) -> None:
             # As a property of the element an old value would pull at a slider that moves.
@@ -246,23 +199,38 @@ class Page:
             known if value in known else [*known, value],
             label=_CHOICES[name],
             value=value,
-            on_change=lambda event: self._change(name, event.value),
+            on_change=lambda event: self.change(name, event.value),
         ).props(f'dense outlined options-dense aria-label="{_CHOICES[name]}" name={name}')
 
-    def _change(self, name: str, value: Any) -> None:
+    async def change(self, name: str, value: Any) -> None:
+        """Take a value of an input, and show the answer to it."""
         self._inputs = self._inputs | {name: value}
-        self._latest.ask()
+        await self.answer()
 
-    def _set_pale(self, words: str) -> None:
-        self._status.set_text(words)
-        for each in self._pale:
-            each.classes(add='stale') if words else each.classes(remove='stale')
+    async def answer(self) -> None:
+        """Compute the answer to the present inputs beside the server, and show it.
 
-    def _show(self, answer: tuple[Explored, str, str]) -> None:
-        found, figures, numbers = answer
+        Changes that come meanwhile are answered together, by the last of them.
+        """
+        for each in self._answers:
+            each.classes(add='stale')
+        async with self._one:
+            inputs = self._inputs
+            if inputs is self._answered:
+                return
+            try:
+                self._show(*await asyncio.to_thread(answer, inputs))
+            except Exception as error:
+                self._status.set_text(f'no answer: {error}')
+                raise
+            self._answered = inputs
+            if inputs is self._inputs:
+                for each in self._answers:
+                    each.classes(remove='stale')
+
+    def _show(self, found: Explored, figures: str, numbers: str) -> None:
         # A material has its stiffness from its law.
         self._controls['stiffness'].set_visibility(found.inputs['material'] == MEASURED)
-        self._answers += 1
         self._figures.set_content(f'<div class="figures">{figures}</div>')
         for name, element in self._remarks.items():
             element.set_content(
@@ -273,10 +241,11 @@ class Page:
                     if each.name == name
                 )
             )
+        self._count += 1
         self._numbers.set_content(
-            f'<div class="numbers" data-answer="{self._answers}">{numbers}</div>'
+            f'<div class="numbers" data-answer="{self._count}">{numbers}</div>'
         )
-        self._set_pale('')
+        self._status.set_text('')
 
     async def _export(self) -> None:
         """Download the foot of the present inputs."""
