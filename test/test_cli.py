@@ -17,9 +17,9 @@ import pytest
 
 from ros_pad import cli, configuration
 from ros_pad.bags import BagReader
-from ros_pad.commands.command import INTERRUPTED
 from ros_pad.errors import BagError
 from ros_pad.records import PRESSURE
+from ros_pad.signals import INTERRUPTED
 
 CAP = 300.0  # s: no test waits longer for an event, however slow the machine
 SCENE = configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml'

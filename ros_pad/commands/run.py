@@ -20,15 +20,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ros_pad.bags import annotate
-from ros_pad.commands.command import (
-    FILE,
-    FOLDER,
-    INTERRUPTED,
-    Commands,
-    add_command,
-    complain,
-    print_table,
-)
+from ros_pad.commands.command import FILE, FOLDER, Commands, add_command, complain, print_table
 from ros_pad.commands.folder import kept_if_filled, new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
@@ -37,7 +29,7 @@ from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import ConfigError, InvalidInput, PadError
 from ros_pad.estimation.tuning import SOURCES
-from ros_pad.signals import STOP
+from ros_pad.signals import INTERRUPTED, STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.robot import check_reach
 from ros_pad.simulation.scene import Scene, is_bench
@@ -58,20 +50,15 @@ def add(commands: Commands) -> None:
     add('--foot', help="other than the scene's: a name in config/feet or a YAML file")
     add('--out', help='new folder for the results (default: runs/<scene>_...)', **FOLDER)
     add('--json', action='store_true', help='print one JSON object')
-    walk = part.add_argument_group('walk')
-    add = walk.add_argument
+    add = part.add_argument_group('walk').add_argument
     levels_text = (
-        'L0: leg on a rail, L1: robot in the plane, L2: with joints; auto: cheapest that will do'
+        'L0: leg on a rail, L1: in the plane, L2: with joints; auto: cheapest that will do'
     )
     sensing_text = (
-        'what slip is estimated from; joints, with IMU and forces as robots have them, needs L2'
+        'what slip is estimated from; joints, with IMU and forces as on robots, needs L2'
     )
-    compare_text = (
-        'do not also walk the other policies on the same ground, as an adaptive run does'
-    )
-    live_text = (
-        'share the topics, by default in the whole subnet: real regulators get the set-points'
-    )
+    compare_text = 'do not walk the other policies on the same ground, as an adaptive run does'
+    live_text = 'share the topics, by default in the whole subnet: real regulators get set-points'
     of_a_walk = [
         add('--policy', choices=POLICIES, help="chooses morphologies (default: the scene's)"),
         add('--cycles', type=int, help="gait cycles (default: the scene's)"),
@@ -167,7 +154,7 @@ def _walk(
     given: tuple[Scene, str, int, str],
 ) -> int:
     """Walk scene, policy, seed and level of ``given``; write report and summary."""
-    scene, policy, seed, level = given
+    scene, policy, *_ = given
     bag = None if options.no_ros else folder / 'bag'
     if bag is None:
         with bar(f'{policy}, without ROS', scene.duration) as progress:
@@ -187,10 +174,7 @@ def _walk(
     ]
     if bag is not None:
         about = labels.label(
-            scene,
-            policy,
-            seed,
-            level,
+            *given,
             metrics=trial.metrics,
             real_time_factor=trial.real_time_factor,
             comparison=trial.settings['comparison'],
@@ -225,7 +209,7 @@ def _walk_on_nodes(
             ' pip install "ros_pad[ros]", or run without ROS: --no-ros'
         ) from error
     with (
-        contextlib.nullcontext() if options.live else alone(),
+        contextlib.nullcontext() if options.live else _alone(),
         bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
     ):
         return composed.run(
@@ -247,16 +231,15 @@ def _write_report(trial: Trial, page: pathlib.Path) -> pathlib.Path | None:
 
 
 @contextlib.contextmanager
-def alone() -> Iterator[None]:
+def _alone() -> Iterator[None]:
     """Hide the topics of this process, so that no real regulator receives the set-points."""
     before = os.environ.get(_DISCOVERY)
     os.environ[_DISCOVERY] = 'OFF'
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[_DISCOVERY]
-        else:
+        del os.environ[_DISCOVERY]
+        if before is not None:
             os.environ[_DISCOVERY] = before
 
 

@@ -24,18 +24,12 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.commands.command import (
-    FOLDER,
-    INTERRUPTED,
-    Commands,
-    add_command,
-    complain,
-    print_table,
-)
+from ros_pad.commands.command import FOLDER, Commands, add_command, complain, print_table
 from ros_pad.commands.folder import kept_if_filled, new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import integer
 from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.signals import INTERRUPTED
 from ros_pad.simulation import fidelity as levels
 from ros_pad.trials import sweep as sweeps
 

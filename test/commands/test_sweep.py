@@ -19,9 +19,9 @@ import time
 import pytest
 
 from ros_pad import cli
-from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.sweep import parameters, seeds
 from ros_pad.errors import InvalidInput
+from ros_pad.signals import INTERRUPTED
 from ros_pad.trials.sweep import Sweep
 from ros_pad.trials.sweep.execution import run_job
 from ros_pad.trials.sweep.table import Results, write_tables

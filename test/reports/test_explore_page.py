@@ -14,9 +14,9 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from ros_pad import cli
-from ros_pad.commands.command import INTERRUPTED
 from ros_pad.contact import Foot
 from ros_pad.reports import explore_page
+from ros_pad.signals import INTERRUPTED
 from studies.work_precision import explore as study
 
 pytest.importorskip('nicegui', reason="the extra is missing: pip install 'ros_pad[explore]'")
