@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ros_pad.contact import Design, rise_height
 from ros_pad.contact.candidates import Candidate, Span
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import BLACK, BLUE, VERMILION, WIDE
+from ros_pad.reports.style import BLACK, BLUE, VERMILION, WIDE, legend
 
 
 def draw(path: str | os.PathLike[str], designs: Sequence[Design]) -> None:
@@ -64,9 +65,12 @@ def draw_candidates(
             _bar(pressures, 1e-3, each.largest_pressure, place + 0.15, VERMILION, 's')
             _bar(pressures, 1e-3, each.pressure, place - 0.15, BLUE, 'o')
             _bar(heights, 1e3, each.height, place, BLUE, 'o')
-        pressures.axvline(1e-3 * ceiling, color=BLACK, lw=1.0, ls=':', label='supply')
-        pressures.plot([], [], 'o-', color=BLUE, label='for the load')
-        pressures.plot([], [], 's-', color=VERMILION, label='largest')
+        supply = pressures.axvline(1e-3 * ceiling, color=BLACK, lw=1.0, ls=':', label='supply')
+        handles = [
+            supply,
+            Line2D([], [], color=BLUE, marker='o', label='for the load'),
+            Line2D([], [], color=VERMILION, marker='s', label='largest'),
+        ]
         names = [
             f'{each.material}, {1e3 * (each.pad.thickness or 0.0):g} mm'
             + ('' if each.carried == 'yes' else f' ({each.carried})')
@@ -77,7 +81,7 @@ def draw_candidates(
         pressures.set(xscale='log', xlabel='gauge pressure, kPa')
         pressures.xaxis.set_major_formatter('{x:g}')
         heights.set(xlim=(0.0, None), xlabel='height of the free dome, mm')
-        drawn.legend(loc='outside upper right', ncols=3)
+        legend(drawn, handles)
         return drawn
 
     write_picture(path, figure)

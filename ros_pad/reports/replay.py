@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import VERMILION, WIDE
+from ros_pad.reports.style import VERMILION, WIDE, legend
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.replay import Replay
 
@@ -59,7 +59,7 @@ def _figure(replay: Replay) -> Figure:
         Line2D([], [], label='recorded' if anything else 'recorded (none)', **RECORDED),
         Line2D([], [], label='replayed', **REPLAYED),
     ]
-    figure.legend(handles=lines, loc='outside upper right', ncols=2)
+    legend(figure, lines)
     return figure
 
 
