@@ -1,7 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parse and run the ``pad`` command.
+"""Feet with inflatable pads for legged robots: simulate, record, analyse.
 
-Importing all commands takes about a second, so only the module of the given command is imported.
+All values are in SI units; pressures are gauge.
+
+exit status: 0 done; 1 a failure at run time, a replay that differs, failed trials, or a problem
+that pad doctor found; 2 bad usage or input; 130 stopped by Ctrl-C or SIGTERM
+
+For example:
+  pad run hexapod_patches --seed 3
+
+pad COMMAND --help shows details and examples.
 """
 
 from __future__ import annotations
@@ -12,7 +20,7 @@ import sys
 from collections.abc import Sequence
 
 import ros_pad
-from ros_pad.commands.command import Help, exit_status
+from ros_pad.commands.command import Help, exit_status, prose
 from ros_pad.signals import STOP, interrupt
 
 COMMANDS = {
@@ -33,18 +41,6 @@ COMMANDS = {
 }
 """Summary of each command, by the name of its module in ``ros_pad.commands``, in the order of
 ``pad --help``."""
-
-_DESCRIPTION = """\
-Feet with inflatable pads for legged robots: simulate, record, analyse.
-All values are in SI units; pressures are gauge."""
-_EPILOG = """\
-exit status: 0 done; 1 a failure at run time, a replay that differs, failed trials, or a problem
-that pad doctor found; 2 bad usage or input; 130 stopped by Ctrl-C or SIGTERM
-
-example:
-  pad run hexapod_patches --seed 3
-
-pad COMMAND --help shows details and examples."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,13 +66,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the command line.
 
+    Importing all commands takes about a second, so only the module of one is imported.
+
     Parameters
     ----------
     command : str, optional
         Command whose arguments are added; the others get only name and summary.
     """
+    description, epilog = prose(__doc__).split('\n\nexit', 1)
     top = argparse.ArgumentParser(
-        prog='pad', description=_DESCRIPTION, epilog=_EPILOG, formatter_class=Help
+        prog='pad', description=description, epilog=f'exit{epilog}', formatter_class=Help
     )
     top.add_argument('--version', action='version', version=f'ros_pad {ros_pad.__version__}')
     commands = top.add_subparsers(title='commands', required=True, metavar='COMMAND')

@@ -170,9 +170,13 @@ def test_unknown_key_and_the_nearest(tmp_path):
         ("a: !!int ''", 'not valid YAML: string index out of range'),
         ('a: !!bool maybe', "not valid YAML: 'maybe'"),
         ('a: !!timestamp soon', 'not valid YAML: '),
-        ('a: ' + '[' * 5000, 'line 1, column 103: not valid YAML: nested more than 100 deep'),
+        # Newer versions of libyaml have a limit themselves.
+        (
+            'a: ' + '[' * 5000,
+            'line 1, column .* (nested more than 100 deep|maximum nesting depth)',
+        ),
         ('- ' * 5000, 'line 1, column 201: not valid YAML: nested more than 100 deep'),
-        ('a:\n\tb: 1', r'line 2, column 1: .* \(a tab: YAML is indented with spaces\)'),
+        ('a:\n\tb: 1', 'line 2, column 1: not valid YAML'),
         ('', 'expected a table of keys, found nothing'),
         ('- 1\n- 2', 'expected a table of keys'),
         ('word', 'expected a table of keys'),
