@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         from ros_pad.reports.calibration import draw
         from ros_pad.reports.files import save, write_picture
 
-        write_picture(beside, lambda: draw(found), 150.0)
+        write_picture(beside, lambda: draw(found))
         save(path, foot_file(found).encode(), new_folder=False)
     except ConfigError as error:
         complain(error, 0)

@@ -110,8 +110,9 @@ def _of_stiffness(options: argparse.Namespace, foot: Foot, area: float) -> dict[
     ]
     if options.figure is not None:
         from ros_pad.reports.design import draw
+        from ros_pad.reports.files import write_picture
 
-        draw(options.figure, radii)
+        write_picture(options.figure, lambda: draw(radii))
     first = next(iter(designs.values()))
     named = [{'name': name} | values(each) for name, each in designs.items()]
     rows = [values(each) for each in radii]
@@ -161,8 +162,9 @@ def _of_materials(options: argparse.Namespace, foot: Foot, area: float) -> dict[
     )
     if options.figure is not None:
         from ros_pad.reports.design import draw_candidates
+        from ros_pad.reports.files import write_picture
 
-        draw_candidates(options.figure, found, rules['ceiling'])
+        write_picture(options.figure, lambda: draw_candidates(found, rules['ceiling']))
     rows = [candidate_values(each) for each in found]
     if not options.json:
         print(f'{found[0].pads} pads of radius {radius:g} m\n')

@@ -79,9 +79,10 @@ def run(options: argparse.Namespace) -> int:
     except BagError as error:
         return complain(error, 2)  # the bag is an input of this command
     if options.figure is not None:
+        from ros_pad.reports.files import write_picture
         from ros_pad.reports.replay import draw
 
-        draw(options.figure, found)
+        write_picture(options.figure, lambda: draw(found))
     if options.out is not None:
         with bar('writing', 1.0, 'bag') as show:
             replayed_bag.write(found, options.out, options.namespace, show)

@@ -141,9 +141,10 @@ def run(options: argparse.Namespace) -> int:
         'figure': options.figure and str(options.figure),
     }
     if options.figure is not None:
-        from ros_pad.reports import wetted
+        from ros_pad.reports.files import write_picture
+        from ros_pad.reports.wetted import draw
 
-        wetted.draw(options.figure, mesh, found, direction)
+        write_picture(options.figure, lambda: draw(mesh, found, direction))
     if options.json:
         # JSON has no NaN.
         print(json.dumps({name: None if v != v else v for name, v in values.items()}))

@@ -13,22 +13,13 @@ from ros_pad.contact import Foot
 from ros_pad.contact.foot_file import foot_text
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.errors import PadError
-from ros_pad.reports import explore_drawings
-from ros_pad.reports.explore import (
-    FIELDS,
-    LIQUIDS,
-    MEASURED,
-    NOTE,
-    Explored,
-    Field,
-    Inputs,
-    explore,
-    inputs_of,
-    rows,
-)
+from ros_pad.reports import explore, explore_drawings
+from ros_pad.reports.explore import FIELDS, LIQUIDS, MEASURED, Explored, Field, Inputs
 from ros_pad.reports.style import BLUE, VERMILION
 
 HOST = '127.0.0.1'
+_NOTE = 'Friction rests on assumed constants, which may be wrong by a factor of two:'
+_NOTE += ' docs/assumptions.md.'
 _GROUPS = {
     'Pads': ('material', 'pads', 'radius', 'stiffness', 'thickness', 'sole_radius', 'criterion'),
     'Air': ('supply', 'pressure', 'bore', 'hose'),
@@ -50,12 +41,11 @@ h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0
 .remark {{ font-size: 0.82rem; line-height: 1.3; margin: 0.1rem 0 0.4rem;
   padding-left: 0.5rem; border-left: 3px solid {BLUE}; overflow-wrap: anywhere; }}
 .remark.error {{ border-color: {VERMILION}; font-weight: 600; }}
-.figures, .numbers {{ display: grid; gap: 0.5rem 1.5rem;
-  grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); }}
+.figures, .numbers {{ display: grid; gap: 0.5rem 1.5rem; }}
 .figures {{ grid-template-columns: repeat(auto-fit, minmax(25rem, 1fr)); }}
-dl {{ margin: 0; font-size: 0.86rem; }}
-dl div {{ display: flex; justify-content: space-between; border-bottom: 1px solid #dcdfe4; }}
-dd {{ margin: 0; font-variant-numeric: tabular-nums; }}
+.numbers {{ grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); }}
+.numbers table {{ width: 100%; font-size: 0.86rem; border-collapse: collapse; }}
+td {{ border-bottom: 1px solid #dcdfe4; }} td:last-child {{ text-align: right; }}
 .note {{ font-size: 0.82rem; margin-top: 0.8rem; }}
 .figures svg {{ width: 100%; height: auto; }}
 .stale {{ opacity: 0.35; transition: opacity 0s 0.1s; }}
@@ -90,7 +80,7 @@ def serve(foot: Foot, port: int, browser: bool) -> None:
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
     core.sio.eio.cors_allowed_origins = None
     ui.run(
-        lambda: Page(inputs_of(foot)).build(),
+        lambda: Page(explore.inputs_of(foot)).build(),
         host=HOST,
         port=port,
         title=f'{foot.source} · pad explore',
@@ -150,7 +140,7 @@ class Page:
                 self._figures = ui.html(sanitize=False)
             with ui.element('section').classes('answer').props('aria-label="Numbers"') as numbers:
                 self._numbers = ui.html(sanitize=False)
-                ui.html(f'<p class="note">{NOTE}</p>', sanitize=False)
+                ui.html(f'<p class="note">{_NOTE}</p>', sanitize=False)
         self._answers = both, numbers
         # The page waits for no answer: NiceGUI gives up on one that takes long.
         ui.timer(0.0, self.answer, once=True)
@@ -249,7 +239,7 @@ class Page:
 
     async def _export(self) -> None:
         """Download the foot of the present inputs."""
-        foot = (await asyncio.to_thread(explore, self._inputs)).foot
+        foot = (await asyncio.to_thread(explore.explore, self._inputs)).foot
         if foot is None:
             self._ui.notify('There is no foot: mend what is marked at the inputs', type='warning')
             return
@@ -278,12 +268,12 @@ def foot_file(foot: Foot) -> str:
 
 def answer(inputs: Inputs) -> tuple[Explored, str, str]:
     """Return the answer to the inputs, its drawings and its numbers, as HTML."""
-    found = explore(inputs)
+    found = explore.explore(inputs)
     numbers = ''
-    for title, group in rows(found).items():
+    for title, group in explore.rows(found).items():
         lines = ''.join(
-            f'<div><dt>{html.escape(label)}</dt><dd id="{key}">{html.escape(text)}</dd></div>'
+            f'<tr><td>{html.escape(label)}</td><td id="{key}">{html.escape(text)}</td></tr>'
             for key, (label, text) in group.items()
         )
-        numbers += f'<div><h2>{title}</h2><dl>{lines}</dl></div>'
+        numbers += f'<div><h2>{title}</h2><table>{lines}</table></div>'
     return found, explore_drawings.drawings(found), numbers
