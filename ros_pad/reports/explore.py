@@ -355,25 +355,23 @@ def _curves(
     loads = np.append(np.linspace(largest / _LOADS, largest, _LOADS), inputs['load'])
     found = {}
     for state in STATES:
-        needs = 'load roughness' + ' film stand' * ('wet' in state)
-        if 'dome' in state:
-            needs += ' pressure'
-        curve = parts(needs, _capacity, inputs, foot, loads, state)
+        dome, wet = 'dome' in state, 'wet' in state
+        if dome and inputs['pressure'] < DOME_PRESSURE:
+            continue  # the foot is flat
+        needs = 'load roughness' + ' film stand' * wet + ' pressure' * dome
+        curve = parts(needs, _capacity, inputs, foot, loads, inputs['pressure'] * dome, wet)
         if curve is not None:
             found[state] = curve
     return loads, found
 
 
-def _capacity(inputs: Inputs, foot: Foot, loads: Array, state: str) -> Array | None:
+def _capacity(inputs: Inputs, foot: Foot, loads: Array, pressure: float, wet: bool) -> Array:
     """Return the capacity under loads, N."""
-    pressure = inputs['pressure'] if 'dome' in state else 0.0
-    if 'dome' in state and pressure < DOME_PRESSURE:
-        return None  # the foot is flat
     most, rough = foot.dome_load(math.inf, pressure), foot.on_rough(inputs['roughness'])
     films, drained, found = (0.0, 0.0), Film(rough), []
     for load in loads.tolist():
         on_domes = min(load, most)
-        if 'wet' in state:
+        if wet:
             drained.touch_down(inputs['film'])
             films = drained.drain(on_domes, load - on_domes, pressure, inputs['stand'])
         found.append(rough.resistance_of(on_domes, load - on_domes, pressure, *films))

@@ -45,31 +45,20 @@ def draw_comparison(ax: Axes, view: View, size: float) -> None:
     """Draw the distance per gait cycle of each policy as bars; ``size`` is that of the text."""
     rows = view.rows
     values = [1e3 * row['distance_per_cycle_m'] for row in rows]
-    own = [row['policy'] == view.trial.policy for row in rows]
+    colours = [BLUE if row['policy'] == view.trial.policy else '#A9B4BC' for row in rows]
     places = np.arange(len(rows))[::-1]
-    ax.barh(places, values, color=[BLUE if mine else '#A9B4BC' for mine in own], height=0.68)
+    bars = ax.barh(places, values, color=colours, height=0.68)
+    look: dict[str, Any] = {'fontsize': size, 'bbox': {'color': 'white', 'pad': 0.5}}
+    ax.bar_label(bars, [f'{value:.0f}' for value in values], padding=4.0, **look)
     names = POLICY_NAMES | {'oracle': 'oracle\n(sees ahead)'}
     ax.set_yticks(places, [names.get(row['policy'], row['policy']) for row in rows])
     ax.tick_params(axis='y', length=0)
     stride = 1e3 * view.trial.settings.get('stride_m', 0.0)
-    reach = max([*values, stride, 1.0])
-    for place, value, mine in zip(places, values, own, strict=True):
-        inside = value > 0.15 * reach
-        ax.text(
-            max(value, 0.0),
-            place,
-            f'{value:.0f} ' if inside else f' {value:.0f}',
-            color='white' if mine and inside else BLACK,
-            ha='right' if inside else 'left',
-            va='center',
-            fontsize=size,
-            fontweight='bold' if mine else 'normal',
-        )
     if stride:
         ax.axvline(stride, color=BLACK, linestyle='--', linewidth=1.0)
         words = f'no slip: {stride:.0f} '
         ax.text(stride, len(rows) - 0.5, words, ha='right', va='bottom', fontsize=0.9 * size)
-    ax.set_xlim(min(0.0, *values), 1.04 * reach)
+    ax.set_xlim(min(0.0, *values), 1.12 * max([*values, stride, 1.0]))
     ax.set_ylim(-0.5, len(rows) - 0.05)
     ax.set_xlabel('advance per gait cycle / mm')
 
