@@ -238,6 +238,21 @@ def test_bad_input_is_status_2(words, reason, tmp_path, monkeypatch, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ['empty', 'scene.yaml']
 
 
+def test_what_the_system_refuses_is_status_1(tmp_path, monkeypatch, capsys):
+    def full(*_):
+        try:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise BagError('bag: cannot be written') from error
+
+    monkeypatch.setattr('ros_pad.bags.recovery.inspect', full)
+    assert cli.main(['bag', 'repair', str(tmp_path)]) == 1
+    assert 'cannot be written' in capsys.readouterr().err
+    # The folder of the picture does not exist.
+    figure = str(tmp_path / 'none' / 'design.png')
+    assert cli.main(['design', '--load', '7', '--foot', 'large37', '--figure', figure]) == 1
+
+
 INTERRUPTED_START = """
 import os, signal, sys
 

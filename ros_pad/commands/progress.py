@@ -35,5 +35,9 @@ def bar(text: str, total: float, unit: str = 's') -> Iterator[Progress]:
         def show(place: float) -> None:
             shown.update(place - shown.n)
 
-        yield show
+        try:
+            yield show
+        except KeyboardInterrupt:
+            shown.delay = 0.0  # its line ends, also where it is just being written
+            raise
         shown.update(total - shown.n)
