@@ -9,6 +9,9 @@
   tangential force  of one half of the ring: a bound, because the other half pushes back
   force limit       largest load of one pad, by criterion: docs/model/force_limit.md
 
+With --model membrane, the free dome and the force limits remain those of the spherical dome; pads
+of a material are membranes.
+
 For example:
   pad contact --pressure 75000 --force 0.1
 """
@@ -50,10 +53,7 @@ def add(commands: Commands) -> None:
     which.add_argument('--material', help=text)
     add('--radius', type=float, metavar='M', help='of a pad of a material, m')
     add('--thickness', type=float, metavar='M', help='of a pad of a material, m')
-    text = (
-        'thesis: spherical dome (default); membrane: exact and slower, but the free dome and the '
-        'force limits remain those of the spherical dome; pads of a material are membranes'
-    )
+    text = 'thesis: spherical dome (default); membrane: exact and slower, see above'
     add('--model', choices=MODELS, help=text)
     add('--json', action='store_true', help='print one JSON object')
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pass a bag through estimators and controller again, and compare the results with those recorded.
 
-The motion stays as recorded: only estimates and decisions may change, as with other parameters.
+The motion stays as recorded: only estimates and decisions may change, as with other parameters
+(--set), such as force_noise (N), expected_load (N), dome_pressure (Pa gauge) or policy.dwell
+(steps). --remap is for one leg (leg_1/wrench:=/left/ft) or for all, with {leg} for the number.
 Exit status: 0 no difference except for rounding or after a gap in the recording; 1 another
 difference; 2 bad input.
 
@@ -43,19 +45,11 @@ def add(commands: Commands) -> None:
     add = part.add_argument
     add('bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file')
     several: dict[str, Any] = {'action': 'append', 'default': []}
-    text = (
-        'another value, in SI units, for a parameter of the estimator or controller node: such as '
-        'force_noise (N), expected_load (N), dome_pressure (Pa gauge) or policy.dwell (steps); '
-        'may be given more than once'
-    )
+    text = 'another value of a parameter of estimator or controller, SI; may be repeated'
     add('--set', metavar='NAME=VALUE', help=text, **several)
     add('--policy', choices=POLICIES, help="chooses morphologies (default: the bag's)")
     add('--foot', help="other than the bag's: a name in config/feet or a YAML file")
-    text = (
-        'read NAME of ros_pad from this TOPIC of the bag, for one leg (leg_1/wrench:=/left/ft) or '
-        "for all legs, with '{leg}' for the number ('leg_{leg}/wrench:=/foot_{leg}/ft'); may be "
-        'given more than once'
-    )
+    text = 'read NAME of ros_pad from this TOPIC of the bag, see above; may be repeated'
     add('--remap', metavar='NAME:=TOPIC', help=text, **several)
     add('--namespace', help='of the robot, such as /robot_1 (default: the only one)')
     text = 'draw P(wet) and set-points, recorded and replayed, into a new .png, .svg or .pdf'

@@ -5,6 +5,10 @@ It runs on all cores or on a Dask cluster, and writes trials.csv, a picture with
 intervals, and a page. A sweep that was stopped or killed continues when the same command is given
 again with --out and its folder; seeds, policies, scenes and values may be added.
 
+NAME of --set is a key of the scene's YAML, with dots between levels (tow.weight, N; cycles), or a
+parameter of the estimator node (filter_period, s) or of the adaptive policy (policy.wet_above).
+The first NAME with several values is the axis of the picture.
+
 For example:
   pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 \
       --set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing
@@ -46,12 +50,7 @@ def add(commands: Commands) -> None:
     add('--policy', metavar='NAMES', help="flat,dome,adaptive,oracle (default: each scene's own)")
     text = 'seeds of floor and noise, with commas, or FIRST:LAST (default 0:4)'
     add('--seed', default='0:4', metavar='LIST', help=text)
-    text = (
-        'values with commas, or START:STOP:COUNT with both ends, in SI units. NAME is a key of '
-        "the scene's YAML, with dots between levels (tow.weight, N; cycles), or a parameter of "
-        'the estimator node (filter_period, s) or of the adaptive policy (policy.wet_above). May '
-        'be given more than once; the first NAME with several values is the axis of the picture'
-    )
+    text = 'values with commas, or START:STOP:COUNT with both ends, SI; may be repeated'
     add('--set', action='append', default=[], metavar='NAME=VALUES', help=text)
     add('--fidelity', choices=levels.FIDELITIES, default='auto', help='level; auto chooses it')
     where = part.add_mutually_exclusive_group()
