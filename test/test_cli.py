@@ -15,6 +15,7 @@ import pytest
 
 from ros_pad import cli, configuration
 from ros_pad.bags import BagReader
+from ros_pad.errors import BagError
 from ros_pad.records import PRESSURE
 from ros_pad.signals import INTERRUPTED
 
