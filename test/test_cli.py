@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ``pad`` command as a user types it: output, exit status, and messages for bad input."""
 
+import errno
 import json
 import os
 import pathlib

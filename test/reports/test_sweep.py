@@ -85,6 +85,7 @@ def test_page(folder):
     (axes,) = pages.drawn(found).figure.axes
     marks = [line.get_ydata()[0] for line in axes.lines if line.get_marker() in ('s', '^')]
     assert sorted(marks) == pytest.approx(sorted(means))
+    assert sum(line.get_markerfacecolor() == 'white' for line in axes.lines) == 2  # left out
     assert 'ValueError: &lt;oh&gt;' in text and 'it fell' in words
     again = 'pad sweep leg_wet_flat --policy dome --seed 7 --set body.rolling_drag=0.25'
     assert again in words
