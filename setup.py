@@ -95,7 +95,6 @@ setup(
     # The lower bounds are the versions of Ubuntu 24.04, on which a Jazzy from apt runs; mcap,
     # which it does not have, writes to disk on request from 1.5 on.
     install_requires=[
-        'argcomplete>=3.1',
         'numpy>=1.26',
         'scipy>=1.11',
         'pyyaml>=6.0',

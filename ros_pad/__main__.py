@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-# PYTHON_ARGCOMPLETE_OK: argcomplete searches for this marker if it completes all commands
 """Start ``pad`` from a shell, so that Ctrl-C leaves no traceback even during the imports."""
 
 from __future__ import annotations
@@ -7,7 +6,7 @@ from __future__ import annotations
 import io
 import sys
 
-from ros_pad.signals import INTERRUPTED, STOP
+from ros_pad.signals import STOP
 
 
 def main() -> int:
@@ -16,12 +15,9 @@ def main() -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # As on stderr: a terminal without m³ shows its code instead of a traceback.
         sys.stdout.reconfigure(errors='backslashreplace')
-    try:
-        from ros_pad import cli
+    from ros_pad import cli
 
-        return cli.main()
-    except KeyboardInterrupt:  # after the command had ended
-        return INTERRUPTED
+    return cli.main()
 
 
 if __name__ == '__main__':

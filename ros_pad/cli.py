@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parse and run the ``pad`` command.
+"""Feet with inflatable pads for legged robots: simulate, record, analyse.
 
-Importing all commands takes about a second, so only the module of the given command is imported.
+All values are in SI units; pressures are gauge.
+
+exit status: 0 done; 1 a failure at run time, a replay that differs, failed trials, or a problem
+that pad doctor found; 2 bad usage or input; 130 stopped by Ctrl-C or SIGTERM
+
+For example:
+  pad run hexapod_patches --seed 3
+
+pad COMMAND --help shows details and examples.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib
-import os
 import sys
 from collections.abc import Sequence
-from functools import partial
-from typing import Any
 
 import ros_pad
-from ros_pad.commands.command import Help, exit_status
-from ros_pad.signals import STOP, end, interrupt
+from ros_pad.commands.command import Help, exit_status, prose
+from ros_pad.signals import STOP, interrupt
 
 COMMANDS = {
     'run': 'walk a scene in closed loop: bag, report, comparison of policies',
@@ -37,22 +42,6 @@ COMMANDS = {
 """Summary of each command, by the name of its module in ``ros_pad.commands``, in the order of
 ``pad --help``."""
 
-_SHIPPED = {
-    **{'scene': 'scenes', 'scenes': 'scenes', 'foot': 'feet', 'material': 'materials'},
-    **{'robot': 'robots', 'mapping': 'mappings'},
-}  # folders of shipped files that a shell completes, by argument
-_DESCRIPTION = """\
-Feet with inflatable pads for legged robots: simulate, record, analyse.
-All values are in SI units; pressures are gauge."""
-_EPILOG = """\
-exit status: 0 done; 1 a failure at run time, a replay that differs, failed trials, or a problem
-that pad doctor found; 2 bad usage or input; 130 stopped by Ctrl-C or SIGTERM
-
-example:
-  pad run hexapod_patches --seed 3
-
-pad COMMAND --help shows details and examples."""
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status.
@@ -63,29 +52,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done; 1 a failure at run time, or a replay that differs; 2 bad usage or input; 130
         stopped by Ctrl-C or SIGTERM.
     """
-    with STOP.during(partial(end, 'pad: stopped\n')):
-        return exit_status(lambda: _run(arguments))
-
-
-def _run(arguments: Sequence[str] | None) -> int:
-    if '_ARGCOMPLETE' in os.environ:
-        return _complete()
     words = sys.argv[1:] if arguments is None else arguments
-    options = parser(_command_in(words)).parse_args(words)
-    with STOP.during(interrupt):
-        return int(options.command(options))
+
+    def run() -> int:
+        command = next((word for word in words if word in COMMANDS), None)
+        options = parser(command).parse_args(words)
+        with STOP.during(interrupt):
+            return int(options.command(options))
+
+    return exit_status(run)
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the command line.
+
+    Importing all commands takes about a second, so only the module of one is imported.
 
     Parameters
     ----------
     command : str, optional
         Command whose arguments are added; the others get only name and summary.
     """
+    description, epilog = prose(__doc__).split('\n\nexit', 1)
     top = argparse.ArgumentParser(
-        prog='pad', description=_DESCRIPTION, epilog=_EPILOG, formatter_class=Help
+        prog='pad', description=description, epilog=f'exit{epilog}', formatter_class=Help
     )
     top.add_argument('--version', action='version', version=f'ros_pad {ros_pad.__version__}')
     commands = top.add_subparsers(title='commands', required=True, metavar='COMMAND')
@@ -95,35 +85,3 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
         else:
             commands.add_parser(name, help=summary)
     return top
-
-
-def _command_in(words: Sequence[str]) -> str | None:
-    return next((word for word in words if word in COMMANDS), None)
-
-
-def _complete() -> int:
-    """Print the completions of the command line that a shell passes to argcomplete."""
-    import argcomplete
-    from argcomplete.completers import FilesCompleter
-
-    from ros_pad import configuration
-
-    def offered(prefix: str, action: argparse.Action, **_: Any) -> list[str]:
-        kind = _SHIPPED.get(action.dest)
-        names = configuration.names(kind) if kind else []
-        return [each for each in names if each.startswith(prefix)] or FilesCompleter()(prefix)
-
-    line = os.environ['COMP_LINE'][: int(os.environ['COMP_POINT'])]
-    before = line.split()[1:] if line.endswith(' ') else line.split()[1:-1]
-    top = parser(_command_in(before))
-    argcomplete.autocomplete(
-        top,
-        always_complete_options='long',
-        default_completer=offered,  # type: ignore[arg-type]  # takes every callable
-    )
-    return 0
-
-
-if __name__ == '__main__':
-    STOP.install('pad: stopped\n')
-    sys.exit(main())

@@ -344,14 +344,12 @@ class Table:
         from ros_pad import yaml_text  # here, because a pad made of numbers needs no PyYAML
 
         try:
-            values = yaml_text.read_yaml(text, yaml_text.StrictLoader)
+            values = yaml_text.read_yaml(text)
         except Exception as error:
             # YAMLError, or others: see read_yaml; a chain of aliases may still be too deep.
             mark = getattr(error, 'problem_mark', None)
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
             problem = getattr(error, 'problem', None) or str(error) or type(error).__name__
-            if mark and any('\t' in row for row in text.splitlines()[mark.line : mark.line + 1]):
-                problem += ' (a tab: YAML is indented with spaces)'
             raise ConfigError(f'{origin}{place}: not valid YAML: {problem}') from error
         return cls(values, origin)
 
@@ -418,13 +416,6 @@ class Table:
         """Read a string."""
         return self.value(Setting(key, str, ''), default)
 
-    def texts(self, key: str) -> list[str]:
-        """Read a list of strings."""
-        value = self._take(key, _REQUIRED)
-        if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
-            raise ConfigError(f'{self.origin}: {_not_allowed(key, value, "a list of texts")}')
-        return value
-
     def vector(
         self,
         key: str,
@@ -438,12 +429,10 @@ class Table:
         value = self._take(key, default)
         try:
             numbers = quantity(key, value, unit, low, high)
+            if numbers.shape != (size,):
+                raise _not_allowed(key, value, f'a list of {size} numbers')
         except InvalidInput as error:
             raise ConfigError(f'{self.origin}: {error}') from None
-        if numbers.shape != (size,):
-            raise ConfigError(
-                f'{self.origin}: {_not_allowed(key, value, f"a list of {size} numbers")}'
-            )
         return numbers
 
     def sequence(self, key: str, default: Any = _REQUIRED) -> tuple[Any, ...]:
@@ -473,9 +462,8 @@ class Table:
         """Raise `ConfigError` for keys that were not read."""
         unknown = [key for key in self._values if key not in self._taken]
         if unknown:
-            near = difflib.get_close_matches(str(unknown[0]), sorted(self._known), n=1)
-            hint = f' Did you mean {near[0]!r}?' if near else ''
+            known = sorted(self._known)
             raise ConfigError(
-                f'{self.origin}: unknown key {unknown[0]!r}.{hint}'
-                f' Allowed: {", ".join(sorted(self._known))}'
+                f'{self.origin}: unknown key {unknown[0]!r}{nearest(unknown[0], known) or "."}'
+                f' Allowed: {", ".join(known)}'
             )

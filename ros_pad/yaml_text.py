@@ -14,13 +14,30 @@ DEEPEST_YAML = 100
 """Most levels of nesting of a YAML text."""
 
 
-def read_yaml(text: str, loader: Any = SAFE_LOADER) -> Any:
+class _StrictLoader(SAFE_LOADER):
+    """A safe loader that raises an error for a key that occurs twice."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return the content of a mapping; raise ConstructorError for a key that occurs twice."""
+        seen = set()
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                continue
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'key {key.value!r} occurs twice', key.start_mark
+                )
+            seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(text: str) -> Any:
     """Return the content of a YAML text.
 
     Raises
     ------
     yaml.YAMLError
-        When the text is not valid, or nested more than 100 deep.
+        When the text is not valid, has a key twice, or is nested more than 100 deep.
     Exception
         Of other kinds, for text that only looks like a date or number (2026-99-99, !!int '').
     """
@@ -36,21 +53,4 @@ def read_yaml(text: str, loader: Any = SAFE_LOADER) -> Any:
                 raise yaml.MarkedYAMLError(None, None, problem, mark)
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
-    return yaml.load(text, Loader=loader)
-
-
-class StrictLoader(SAFE_LOADER):
-    """A safe loader that raises an error for a key that occurs twice."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return the content of a mapping; raise ConstructorError for a key that occurs twice."""
-        seen = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                continue
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'key {key.value!r} occurs twice', key.start_mark
-                )
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
+    return yaml.load(text, Loader=_StrictLoader)

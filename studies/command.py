@@ -7,7 +7,6 @@ import argparse
 import inspect
 import json
 import pathlib
-import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -16,7 +15,7 @@ from typing import Any, TypeVar
 
 from matplotlib.figure import Figure
 
-from ros_pad.commands.command import Help
+from ros_pad.commands.command import Help, prose
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.reports.files import save
@@ -38,12 +37,8 @@ _Result = TypeVar('_Result')
 
 def parser(study: str, doc: str | None) -> argparse.ArgumentParser:
     """Return the parser of a study, with its module's docstring as description and ``--json``."""
-    paragraphs = inspect.cleandoc(doc or '').split('\n\n')
     part = argparse.ArgumentParser(
-        prog=f'python -m studies {study}',
-        # Lines of a paragraph are joined, those of a list are not.
-        description='\n\n'.join(re.sub(r'\n(?!- )\s*', ' ', each) for each in paragraphs),
-        formatter_class=Help,
+        prog=f'python -m studies {study}', description=prose(doc), formatter_class=Help
     )
     part.add_argument('--json', action='store_true', help='print JSON in place of a table')
     return part

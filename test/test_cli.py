@@ -3,7 +3,6 @@
 
 import errno
 import json
-import math
 import os
 import pathlib
 import re
@@ -17,21 +16,12 @@ import pytest
 
 from ros_pad import cli, configuration
 from ros_pad.bags import BagReader
-from ros_pad.commands.command import INTERRUPTED
 from ros_pad.errors import BagError
 from ros_pad.records import PRESSURE
+from ros_pad.signals import INTERRUPTED
 
 CAP = 300.0  # s: no test waits longer for an event, however slow the machine
 SCENE = configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml'
-
-
-def test_scenes_are_listed(capsys):
-    assert cli.main(['scenes']) == 0
-    listed = capsys.readouterr().out
-    for name in configuration.names('scenes'):
-        assert name in listed
-    assert cli.main(['scenes', '--json']) == 0
-    assert sorted(json.loads(capsys.readouterr().out)) == configuration.names('scenes')
 
 
 def test_an_unknown_scene_lists_them_and_the_nearest(capsys):
@@ -171,17 +161,6 @@ def test_a_foot_of_ones_own_walks(tmp_path, capsys, monkeypatch):
     assert '0 to 70000 Pa is needed' in capsys.readouterr().err
 
 
-def test_contact_of_the_pad_of_a_foot(capsys):
-    force = ['contact', '--pressure', '75e3', '--force', '0.1', '--json']
-    answers = []
-    for pad in (['--pad', 'large'], ['--foot', 'large19']):
-        assert cli.main([*force, *pad]) == 0
-        answers.append(json.loads(capsys.readouterr().out)['pressed'])
-    assert answers[0] == answers[1]
-    # Adhesion enlarges the contact; without adhesion pi p b² = F.
-    assert answers[0]['contact_radius_m'] > (0.1 / (math.pi * 75e3)) ** 0.5
-
-
 def test_contact_of_a_pad_of_a_material(capsys):
     sheet = ['--material', 'dragon_skin_10', '--radius', '1.5e-3', '--thickness', '0.4e-3']
     assert cli.main(['contact', '--pressure', '30e3', *sheet, '--json']) == 0
@@ -276,62 +255,37 @@ def test_what_the_system_refuses_is_status_1(tmp_path, monkeypatch, capsys):
     assert cli.main(['design', '--load', '7', '--foot', 'large37', '--figure', figure]) == 1
 
 
-INTERRUPTED_IMPORT = """
-import os, signal, sys
-
-class Interrupt:
-    def find_spec(self, name, path=None, target=None):
-        if name == 'ros_pad.contact':
-            os.kill(os.getpid(), signal.{signal})
-
-sys.meta_path.insert(0, Interrupt())
-signal.signal(signal.SIGINT, signal.default_int_handler)
-from ros_pad import cli
-sys.exit(cli.main(['contact', '--pressure', '75e3']))
-"""
-
-
-@pytest.mark.parametrize('number', ['SIGTERM'])
-def test_a_stop_during_imports_leaves_no_traceback(number):
-    child = subprocess.run(
-        [sys.executable, '-c', INTERRUPTED_IMPORT.format(signal=number)],
-        cwd=SCENE.parent.parent.parent,
-        capture_output=True,
-        text=True,
-        timeout=CAP,
-    )
-    assert (child.returncode, child.stdout) == (INTERRUPTED, '')
-    assert child.stderr == 'pad: stopped\n'
-
-
 INTERRUPTED_START = """
 import os, signal, sys
 
 class Interrupt:
     def find_spec(self, name, path=None, target=None):
-        if name == 'argparse':
-            os.kill(os.getpid(), signal.SIGINT)
+        if name == '{imported}':
+            os.kill(os.getpid(), signal.{number})
 
 sys.meta_path.insert(0, Interrupt())
 signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ['pad', 'contact', '--pressure', '75e3']
 from {module} import {function}
-assert 'argparse' not in sys.modules
+assert '{imported}' not in sys.modules
 sys.exit({function}())
 """
 
 
-def test_ctrl_c_while_the_command_itself_is_imported_leaves_no_traceback():
-    """The console script is interrupted at its start, before it imports ros_pad."""
+@pytest.mark.parametrize(
+    ('imported', 'number'), [('argparse', 'SIGINT'), ('ros_pad.contact', 'SIGTERM')]
+)
+def test_a_signal_during_imports_leaves_no_traceback(imported, number):
+    """It comes while the console script imports ros_pad, or ros_pad the command."""
     root = SCENE.parent.parent.parent
     module, function = re.search(
         r"'pad = ([\w.]+):(\w+)'", (root / 'setup.py').read_text()
     ).groups()
+    script = INTERRUPTED_START.format(
+        imported=imported, number=number, module=module, function=function
+    )
     child = subprocess.run(
-        [sys.executable, '-c', INTERRUPTED_START.format(module=module, function=function)],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        timeout=CAP,
+        [sys.executable, '-c', script], cwd=root, capture_output=True, text=True, timeout=CAP
     )
     assert (child.returncode, child.stdout) == (INTERRUPTED, '')
     assert child.stderr == 'pad: stopped\n'
@@ -344,7 +298,7 @@ def environment():
 
 
 def pad(*arguments):
-    return [sys.executable, '-m', 'ros_pad.cli', *arguments]
+    return [sys.executable, '-m', 'ros_pad', *arguments]
 
 
 def test_a_run_on_nodes_is_recorded_and_reported(tmp_path, environment):

@@ -10,9 +10,6 @@ import textwrap
 
 import pytest
 
-from ros_pad.configuration import number
-from ros_pad.errors import NoBridge
-
 PARTS = 'contact capillary robots sensing estimation control regulators simulation bags trials'
 PARTS += ' trials.sweep trials.recorded trials.replay errors'
 PACKAGES = [f'ros_pad.{part}' for part in PARTS.split()]
@@ -128,27 +125,3 @@ def faults(of: object) -> list[str]:
 @pytest.mark.parametrize('name', sorted(DOCUMENTED)[len(DOCUMENTED) % 3 :: 3])
 def test_the_docstring_is_complete(name: str):
     assert not faults(DOCUMENTED[name])
-
-
-def undocumented_length(length: float, *, mass: float = 1.0) -> float:
-    """Return a length.
-
-    Parameters
-    ----------
-    length : float
-        Length of it.
-    width : float
-        Width, m.
-    """
-    raise NoBridge(number('length', length, 'm'))
-
-
-def test_faults_of_a_docstring_are_found():
-    assert set(faults(undocumented_length)) == {
-        'length: no unit',
-        'mass: not documented',
-        'width: no such parameter',
-        'result: no unit',
-        'NoBridge: not in Raises',
-        'InvalidInput: not in Raises',
-    }

@@ -100,14 +100,6 @@ def test_imports_run_down(part: str):
     assert stated - used <= ROS, 'the table has libraries that are not imported'
 
 
-def test_the_reader_of_imports_sees_them_all(tmp_path: pathlib.Path):
-    path = tmp_path / 'module.py'
-    path.write_text(
-        'import a.b\nfrom c import d as e\ndef f():\n    if 1:\n        from g.h import i\n'
-    )
-    assert imports(path) == {('a.b', False), ('c.d', False), ('g.h.i', True)}
-
-
 WITHOUT = """
 import importlib
 import pkgutil

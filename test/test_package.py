@@ -41,7 +41,7 @@ ROSDEP_KEYS = {
         'rosgraph_msgs',
     ),
     *('sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs', 'visualization_msgs'),
-    *('mcap-ros2-support', 'python3-argcomplete', 'python3-hypothesis', 'python3-matplotlib'),
+    *('mcap-ros2-support', 'python3-hypothesis', 'python3-matplotlib'),
     'python3-numpy',
     *('python3-pytest', 'python3-pytest-xdist', 'python3-rosbags-pip', 'python3-scipy'),
     *('python3-serial', 'python3-tqdm', 'python3-yaml'),

@@ -9,8 +9,6 @@ import pathlib
 import re
 import subprocess
 import sys
-import urllib.parse
-import xml.etree.ElementTree
 
 import pytest
 
@@ -37,11 +35,6 @@ def site(tmp_path_factory):
     return folder
 
 
-def pages(site):
-    """Return the pages that are made from docs/."""
-    return [(site / page.relative_to(DOCS)).with_suffix('.html') for page in DOCS.rglob('*.md')]
-
-
 @pytest.mark.slow
 def test_every_public_name_has_an_entry(site):
     data = inventory.InventoryFile.loads((site / 'objects.inv').read_bytes(), uri='').data
@@ -57,24 +50,6 @@ def test_every_command_is_described(site):
     text = (site / 'options.html').read_text(encoding='utf-8')
     for command in cli.COMMANDS:
         assert f'usage: pad {command}' in re.sub('<[^>]*>', '', text)
-
-
-@pytest.mark.slow
-def test_links_lead_to_pages_and_to_files_of_the_repository(site):
-    package = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
-    repository = package.findtext("url[@type='repository']")
-    texts = {page: page.read_text(encoding='utf-8') for page in pages(site)}
-    ids = {page: set(re.findall(r' id="([^"]*)"', text)) for page, text in texts.items()}
-    for page, text in texts.items():
-        for link in set(re.findall(r' (?:href|src)="([^"]*)"', text)):
-            path, _, anchor = urllib.parse.unquote(link).partition('#')
-            if path.startswith(repository):
-                name = re.sub('^/(blob|tree)/main/', '', path.removeprefix(repository))
-                assert (ROOT / name).exists(), f'{page}: {link}'
-            elif not re.match(r'\w+:', path):
-                target = (page.parent / path.partition('?')[0]).resolve() if path else page
-                assert target.exists(), f'{page}: {link}'
-                assert not anchor or anchor in ids.get(target, {anchor}), f'{page}: {link}'
 
 
 def test_gallery_and_examples_show_every_chart_and_how_it_is_made():

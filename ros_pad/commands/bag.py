@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad bag``: list the content of a bag, or repair an incomplete one."""
+"""List the content of a bag, or repair an incomplete one.
+
+info: list topics with types, numbers of messages, rates, gaps and losses; repair: copy the
+messages that can be read from an incomplete bag (recorder killed, disk full) into a new bag.
+
+For example:
+  pad bag info runs/hexapod_patches_adaptive_seed0/bag
+  pad bag repair my_trial --out my_trial_repaired
+"""
 
 from __future__ import annotations
 
@@ -14,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from ros_pad.bags import BagReader, recovery
-from ros_pad.commands.command import FOLDER, Commands, add_command, complain
+from ros_pad.commands.command import FOLDER, Commands, add_command, complain, print_table
 from ros_pad.commands.progress import bar
 from ros_pad.errors import BagError, InvalidInput
-from ros_pad.pace import part
+from ros_pad.pace import Progress, part
 from ros_pad.trials import label as labels
 from ros_pad.trials.recorded import late
 
@@ -30,16 +38,7 @@ _LOSSES = {
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    example = (
-        'pad bag info runs/hexapod_patches_adaptive_seed0/bag\n'
-        'pad bag repair my_trial --out my_trial_repaired'
-    )
-    text = (
-        'info: list topics with types, numbers of messages, rates, gaps and losses; repair: copy '
-        'the messages that can be read from an incomplete bag (recorder killed, disk full) into a '
-        'new bag.'
-    )
-    part = add_command(commands, 'bag', run, text, example)
+    part = add_command(commands, 'bag', run, __doc__)
     add = part.add_argument
     add('action', choices=('info', 'repair'), help='see above')
     add('bag', type=pathlib.Path, metavar='BAG', help='folder of a bag, or one MCAP file')
@@ -53,11 +52,9 @@ def run(options: argparse.Namespace) -> int:
         return _repair(options)
     if options.out:
         raise InvalidInput('--out is only for pad bag repair: pad bag info writes nothing')
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), bar('reading', 1.0, 'bag') as progress:
         warnings.simplefilter('ignore')  # the problem is reported below
-        with bar('opening', 1.0, 'bag', delay=1.0) as progress:
-            reader = BagReader(options.bag, progress)
-    found = _content(options.bag, reader)
+        found = _content(options.bag, progress)
     problem = found['problem']
     if options.json:
         print(json.dumps(found))
@@ -91,8 +88,9 @@ def _repair(options: argparse.Namespace) -> int:
     return 0
 
 
-def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
+def _content(bag: pathlib.Path, progress: Progress) -> dict[str, Any]:
     """Return what JSON has of a bag."""
+    reader = BagReader(bag, part(progress, 0.0, 0.4))
 
     def custom(key: str) -> dict[str, Any]:
         try:
@@ -104,9 +102,8 @@ def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
 
     problem, times, slow = reader.problem, {}, []
     try:
-        with bar('reading', 1.0, 'bag', delay=1.0) as progress:
-            times = reader.log_times(part(progress, 0.0, 0.5))
-            slow = late(reader, part(progress, 0.5, 1.0))
+        times = reader.log_times(part(progress, 0.4, 0.7))
+        slow = late(reader, part(progress, 0.7, 1.0))
     except BagError as error:  # what does not depend on single messages is listed all the same
         problem = problem or str(error)
     return {
@@ -154,15 +151,17 @@ def _show(found: Mapping[str, Any]) -> None:
         _show_losses(repair)
     for line in found['late']:
         print(line)
-    print('messages    mean rate  longest gap  topic')
     lost = dict(found['lost'])
-    for name, topic in sorted(found['topics'].items()):
-        rate, gap = (
+    rows = [
+        [name, topic['type'], str(topic['messages'])]
+        + [
             '-' if topic[key] is None else f'{topic[key]:.4g} {unit}'
             for key, unit in (('rate_hz', 'Hz'), ('longest_gap_s', 's'))
-        )
-        gone = f'  {lost.pop(name)} lost' if name in lost else ''
-        print(f'{topic["messages"]:8d}  {rate:>11}  {gap:>11}  {name}  {topic["type"]}{gone}')
+        ]
+        + [str(lost.pop(name, ''))]
+        for name, topic in sorted(found['topics'].items())
+    ]
+    print_table(['topic', 'type', 'messages', 'mean rate', 'longest gap', 'lost'], rows, texts=2)
     for name, count in sorted(lost.items()):
         print(f'{count} batches lost: {name}')
 

@@ -1,5 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad calibrate``: fit a foot to measurements."""
+"""Fit a foot to measured shapes and forces.
+
+Write its YAML file, and beside it a picture of the fit and its residuals.
+
+For example:
+  pad calibrate my_pads.csv --foot large37 --out my_foot.yaml
+  pad calibrate my_pads.csv --material dragon_skin_10 --thickness 0.4e-3
+"""
 
 from __future__ import annotations
 
@@ -10,7 +17,7 @@ import pathlib
 from dataclasses import asdict
 from typing import Any
 
-from ros_pad.commands.command import FILE, Commands, add_command, complain
+from ros_pad.commands.command import FILE, Commands, add_command, complain, print_table
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import choice, refuse
 from ros_pad.contact import Foot, Material, Pad
@@ -21,15 +28,7 @@ from ros_pad.errors import ConfigError, InvalidInput
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Fit a foot to measured shapes and forces; write its YAML file, and beside it a picture '
-        'of the fit and its residuals.'
-    )
-    example = (
-        'pad calibrate my_pads.csv --foot large37 --out my_foot.yaml\n'
-        'pad calibrate my_pads.csv --material dragon_skin_10 --thickness 0.4e-3'
-    )
-    part = add_command(commands, 'calibrate', run, text, example)
+    part = add_command(commands, 'calibrate', run, __doc__)
     add = part.add_argument
     text = 'measurements, as docs/calibrate.md and config/measurements/thesis.csv have them'
     add('csv', metavar='CSV', type=pathlib.Path, help=text)
@@ -55,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     for each in (path, beside):
         refuse(each, options.force)
     foot = Foot.load(options.foot)
-    with bar('fitting', 1.0, 'foot', delay=1.0):
+    with bar('fitting', 1.0, 'foot'):
         found = calibrate(
             Measurements.read(options.csv),
             foot,
@@ -68,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         from ros_pad.reports.calibration import draw
         from ros_pad.reports.files import save, write_picture
 
-        write_picture(beside, lambda: draw(found), 150.0)
+        write_picture(beside, lambda: draw(found))
         save(path, foot_file(found).encode(), new_folder=False)
     except ConfigError as error:
         complain(error, 0)
@@ -117,21 +116,20 @@ def _values(
 
 
 def _show(found: Calibration) -> None:
-    print(f'{"constant":20} {"value":>11}  {"95 % interval":>25}  {"unit":15} points')
+    rows = []
     for each in found.constants:
         between = 'too few points' if each.fitted else 'kept'
         if not math.isnan(each.low):
             between = f'{each.low:.4g} to {each.high:.4g}'
-        print(
-            f'{each.name:20} {each.value:11.5g}  {between:>25}  {each.unit:15} {each.points:6d}'
-            f'  {each.note}'
-        )
-    print(f'\n{"measured":18} {"at":34} {"measured":>11} {"model":>11}   error')
+        rows.append([each.name, each.unit, f'{each.value:.5g}', between, f'{each.points}'])
+        rows[-1].append(each.note)
+    print_table(['constant', 'unit', 'value', '95 % interval', 'points', ''], rows, texts=2)
+    rows = []
     for row in found.residuals:
-        error = 'none in the model' if math.isnan(row.error) else f'{100.0 * row.error:+6.1f} %'
-        print(
-            f'{row.quantity:18} {row.setting:34} {row.measured:11.5g} {row.modelled:11.5g}'
-            f'  {error}{"" if row.used else "  (not fitted)"}'
-        )
+        error = 'none in the model' if math.isnan(row.error) else f'{100.0 * row.error:+.1f} %'
+        values = [f'{row.measured:.5g}', f'{row.modelled:.5g}', error]
+        rows.append([row.quantity, row.setting, *values, '' if row.used else '(not fitted)'])
+    print()
+    print_table(['measured', 'at', 'measured', 'model', 'error', ''], rows, texts=2)
     for warning in found.warnings:
         print(f'\nnote: {warning}')

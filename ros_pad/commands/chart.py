@@ -1,5 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad chart``: run a work-precision study, which measures time and error of each method."""
+"""Measure time, error and failures of every method on this machine.
+
+This runs python -m studies NAME, which needs a checkout of ros_pad and writes table, JSON and
+pictures.
+
+For example:
+  pad chart contact
+"""
 
 from __future__ import annotations
 
@@ -13,11 +20,7 @@ CHARTS = ('capillary', 'contact', 'estimator', 'meniscus', 'stability', 'walk')
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Measure time, error and failures of every method on this machine; write table, JSON and '
-        'pictures. This runs python -m studies NAME, which needs a checkout of ros_pad.'
-    )
-    part = add_command(commands, 'chart', run, text, 'pad chart contact')
+    part = add_command(commands, 'chart', run, __doc__)
     add = part.add_argument
     add('name', choices=CHARTS, help='study to run; they take from 10 s to two minutes')
     add('--out', help='folder, in which files are replaced (default: a new one in runs)', **FOLDER)
@@ -26,5 +29,4 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the work-precision study; return the exit status."""
-    words = ['--out', str(options.out)] if options.out else []
-    return run_study(options.name, *words, *(['--json'] if options.json else []))
+    return run_study(options.name, out=options.out, json=options.json)

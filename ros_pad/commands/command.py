@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
 import os
 import pathlib
@@ -11,7 +12,6 @@ import re
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any, TypeAlias
 
 from ros_pad.errors import BagError, ConfigError, InvalidInput, PadError, reason
@@ -32,44 +32,33 @@ Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 
 
 class Help(argparse.HelpFormatter):
-    """Format help: texts keep their lines; those that are no command are folded where too long."""
+    """Format help: texts keep their lines; those that are not indented are folded."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         return '\n'.join(
-            line if line.lstrip().startswith('pad ') else textwrap.fill(line, width)
+            line if line.startswith(' ') else textwrap.fill(line, width)
             for line in text.splitlines()
         )
 
 
+def prose(doc: str | None) -> str:
+    """Return a docstring whose paragraphs are lines; lists and indented lines stay as they are."""
+    return re.sub(r'(?<!\n)\n(?![\n -])', ' ', inspect.cleandoc(doc or ''))
+
+
 def add_command(
-    commands: Commands,
-    name: str,
-    run: Callable[[argparse.Namespace], int],
-    text: str,
-    example: str,
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], doc: str | None
 ) -> argparse.ArgumentParser:
-    """Add a command with its description and examples, one in each line; return its parser."""
-    lines = [line.strip() for line in example.splitlines()]
+    """Add a command and return its parser.
+
+    The docstring of its module is the help: description, and as last paragraph examples.
+    """
+    description, _, examples = prose(doc).rpartition('\n\n')
     parser = commands.add_parser(
-        name,
-        description=text,
-        epilog='\n  '.join(['example:' if len(lines) == 1 else 'examples:', *lines]),
-        formatter_class=Help,
+        name, description=description, epilog=examples, formatter_class=Help
     )
-    parser.register('type', float, partial(_read, float, 'a number in SI units, without a unit,'))
-    parser.register('type', int, partial(_read, int, 'a whole number'))
-    # Without this, -75e3 would be taken for an option (Python 3.14 has the same pattern).
-    parser._negative_number_matcher = re.compile(r'-\.?\d')
     parser.set_defaults(command=run)
     return parser
-
-
-def _read(kind: type[float] | type[int], needed: str, word: str) -> float:
-    """Return an argument as a number, in the form of a ``type`` of argparse."""
-    try:
-        return kind(word)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f'{word} is not allowed: {needed} is needed') from None
 
 
 def exit_status(run: Callable[[], int], program: str = 'pad') -> int:
@@ -109,12 +98,13 @@ def complain(error: object, status: int, program: str = 'pad') -> int:
 
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> None:
-    """Print a table; the first ``texts`` columns are aligned left, the others right."""
+    """Print a table; the first ``texts`` columns and those without a head are aligned left."""
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    left = [place < texts or not name for place, name in enumerate(head)]
     for row in (head, *rows):
         cells = [
-            cell.ljust(width) if column < texts else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+            cell.ljust(width) if is_text else cell.rjust(width)
+            for cell, width, is_text in zip(row, widths, left, strict=True)
         ]
         print('  '.join(cells).rstrip())
 

@@ -1,5 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad contact``: shape, meniscus and force limits of one pad."""
+"""Compute the shape of a pad at a pressure, free or pressed, and its force limits.
+
+  height            of the sphere over the pad base, before the floor cuts it
+  depth             part of that height that the floor cuts off
+  gap               from pad base to floor: height less depth
+  ring of liquid    balance of weight and surface tension around a single pad; it does not
+                    depend on the width of the gap, and is no prediction (docs/errata.md)
+  tangential force  of one half of the ring: a bound, because the other half pushes back
+  force limit       largest load of one pad, by criterion: docs/model/force_limit.md
+
+With --model membrane, the free dome and the force limits remain those of the spherical dome; pads
+of a material are membranes.
+
+For example:
+  pad contact --pressure 75000 --force 0.1
+"""
 
 from __future__ import annotations
 
@@ -21,22 +36,11 @@ _TITLES = {
     'meniscus': 'ring of liquid',
     'force_limit_n': 'force limit, by criterion',
 }
-_DESCRIPTION = """\
-Shape of a pad at a pressure, free or pressed, and its force limits.
-
-  height            of the sphere over the pad base, before the floor cuts it
-  depth             part of that height that the floor cuts off
-  gap               from pad base to floor: height less depth
-  ring of liquid    balance of weight and surface tension around a single pad; it does not
-                    depend on the width of the gap, and is no prediction (docs/errata.md)
-  tangential force  of one half of the ring: a bound, because the other half pushes back
-  force limit       largest load of one pad, by criterion: docs/model/force_limit.md"""
 
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    example = 'pad contact --pressure 75000 --force 0.1'
-    part = add_command(commands, 'contact', run, _DESCRIPTION, example)
+    part = add_command(commands, 'contact', run, __doc__)
     add = part.add_argument
     text = 'gauge pressure in the pad, Pa'
     add('--pressure', type=float, required=True, metavar='PA', help=text)
@@ -49,12 +53,8 @@ def add(commands: Commands) -> None:
     which.add_argument('--material', help=text)
     add('--radius', type=float, metavar='M', help='of a pad of a material, m')
     add('--thickness', type=float, metavar='M', help='of a pad of a material, m')
-    add(
-        '--model',
-        choices=MODELS,
-        help='thesis: spherical dome (default); membrane: exact and slower, but the free dome and '
-        'the force limits remain those of the spherical dome; pads of a material are membranes',
-    )
+    text = 'thesis: spherical dome (default); membrane: exact and slower, see above'
+    add('--model', choices=MODELS, help=text)
     add('--json', action='store_true', help='print one JSON object')
 
 

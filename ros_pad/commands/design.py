@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad design``: compute how many pads fit on a sole, and at which pressure they carry a load."""
+"""Compute number, load, pressure and height of rise of the pads on a sole.
+
+One of --sole-radius and --foot is needed. With --material, or a foot whose pads name one: a table
+of pads of each material and thickness, with intervals from what is unsure of the materials.
+
+For example:
+  pad design --load 7 --foot large37 --figure design.png
+  pad design --load 2 --sole-radius 0.017 --material all --thickness 0.2e-3 0.4e-3
+"""
 
 from __future__ import annotations
 
@@ -10,20 +18,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ros_pad import configuration
 from ros_pad.commands.command import FILE, Commands, add_command, print_table
-from ros_pad.commands.folder import PICTURES, check_pictures, refuse_existing
-from ros_pad.commands.progress import bar
+from ros_pad.commands.folder import check_picture
 from ros_pad.configuration import number
-from ros_pad.contact import LARGE_PAD, Design, Foot, Material, design
+from ros_pad.contact import Design, Foot, Material, design
 from ros_pad.contact.candidates import Candidate, candidates
 from ros_pad.contact.design import CELL
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, criteria, resized
 from ros_pad.errors import InvalidInput
 
-CEILING = 90e3  # Pa gauge, the ceiling of the shipped feet
+USUAL = 'large37'  # the foot whose pads and ceiling are used where none is given
 RADII = (0.3e-3, 0.4e-3, 0.5e-3, 0.6e-3, 0.8e-3, 1e-3, 1.25e-3, 1.5e-3, 1.75e-3, 2e-3, 2.5e-3)
 MATERIAL_CRITERION = 'flattening'
 SHEETS = (2.0 / 15.0, 4.0 / 15.0, 6.0 / 15.0)  # thickness over radius: 0.4 mm of 1.5 and others
@@ -31,17 +36,7 @@ SHEETS = (2.0 / 15.0, 4.0 / 15.0, 6.0 / 15.0)  # thickness over radius: 0.4 mm o
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Compute number, load, pressure and height of rise of the pads on a sole.\nOne of '
-        '--sole-radius and --foot is needed.\nWith --material, or a foot whose pads name one: a '
-        'table of pads of each material and thickness, with intervals from what is unsure of the '
-        'materials.'
-    )
-    example = (
-        'pad design --load 7 --foot large37 --figure design.png\n'
-        'pad design --load 2 --sole-radius 0.017 --material all --thickness 0.2e-3 0.4e-3'
-    )
-    part = add_command(commands, 'design', run, text, example)
+    part = add_command(commands, 'design', run, __doc__)
     add = part.add_argument
     add('--load', type=float, required=True, metavar='N', help='on one foot, N')
     add('--sole-radius', type=float, metavar='M', help='radius of the sole, m')
@@ -63,16 +58,15 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the designs; return the exit status."""
-    refuse_existing('--figure', options.figure, PICTURES)
-    check_pictures(options.figure)
-    foot = None if options.foot is None else Foot.load(options.foot)
+    check_picture(options.figure)
+    foot = Foot.load(options.foot or USUAL)
     if options.sole_radius is not None:
         area = math.pi * number('--sole-radius', options.sole_radius, 'm', above=True) ** 2
-    elif foot is not None:
+    elif options.foot is not None:
         area = foot.sole_area
     else:
         raise InvalidInput('the size of the sole is missing: give --sole-radius (m) or --foot')
-    if options.material is not None or (foot is not None and foot.pad.material is not None):
+    if options.material is not None or foot.pad.material is not None:
         found = _of_materials(options, foot, area)
     elif options.thickness is not None:
         raise InvalidInput('--thickness needs --material, or a foot whose pads name a material')
@@ -86,74 +80,73 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_stiffness(options: argparse.Namespace, foot: Foot | None, area: float) -> dict[str, Any]:
+def _as_built(options: argparse.Namespace, foot: Foot, radius: float, area: float) -> int | None:
+    """Return the number of pads of the foot that was asked for, if sole and radius are its own."""
+    own = options.foot is not None and (radius, area) == (foot.pad.radius, foot.sole_area)
+    return foot.pads if own else None
+
+
+def _of_stiffness(options: argparse.Namespace, foot: Foot, area: float) -> dict[str, Any]:
     """Design pads of a stiffness, as built and as many as fit; return what JSON has."""
-    pad = LARGE_PAD if foot is None else foot.pad
+    pad = foot.pad
     if options.stiffness not in (None, pad.stiffness):
         pad = replace(pad, stiffness=options.stiffness, measured_limit=None)
     if options.radius is not None:
         pad = resized(pad, options.radius)
-    own = DEFAULT_CRITERION if foot is None else foot.limit
+    own = DEFAULT_CRITERION if options.foot is None else foot.limit
     criterion = options.criterion or (own if own in criteria(pad) else DEFAULT_CRITERION)
-    rules: dict[str, Any] = {'ceiling': _ceiling(options, foot), 'margin': options.margin}
+    ceiling = foot.ceiling if options.pressure is None else options.pressure
+    rules: dict[str, Any] = {'ceiling': ceiling, 'margin': options.margin}
     designs = {'full': design(options.load, area, pad, criterion=criterion, **rules)}
-    if foot is not None and (pad.radius, area) == (foot.pad.radius, foot.sole_area):
-        built = design(options.load, area, pad, pads=foot.pads, criterion=criterion, **rules)
+    if pads := _as_built(options, foot, pad.radius, area):
+        built = design(options.load, area, pad, pads=pads, criterion=criterion, **rules)
         designs = {'as built': built, **designs}
     # Limits measured on one pad do not hold for another radius.
     rules['criterion'] = DEFAULT_CRITERION if criterion == 'measured' else criterion
-
-    def over(radii: Sequence[float]) -> list[Design]:
-        fit = [r for r in radii if area >= CELL * r * r and r >= (pad.thickness or 0.0)]
-        found = []
-        with bar('radii', max(len(fit), 1), 'radii', delay=1.0) as progress:
-            for r in fit:
-                found.append(design(options.load, area, resized(pad, r), **rules))
-                progress(len(found))
-        return found
-
-    rows = over(RADII)
+    radii = [
+        design(options.load, area, resized(pad, radius), **rules)
+        for radius in RADII
+        if area >= CELL * radius**2 and radius >= (pad.thickness or 0.0)
+    ]
     if options.figure is not None:
         from ros_pad.reports.design import draw
+        from ros_pad.reports.files import write_picture
 
-        draw(options.figure, over(np.linspace(0.3e-3, 2.5e-3, 89).tolist()))
+        write_picture(options.figure, lambda: draw(radii))
+    first = next(iter(designs.values()))
+    named = [{'name': name} | values(each) for name, each in designs.items()]
+    rows = [values(each) for each in radii]
     if not options.json:
-        _print(designs, rows)
-    return {
-        'designs': [{'name': name, **values(each)} for name, each in designs.items()],
-        'radii': [values(each) for each in rows],
-        'says': list(advice(next(iter(designs.values())))),
-    }
+        print(
+            f'{first.load:g} N on a sole of {first.area:.4g} m², pads of {first.pad.stiffness:g}'
+            f' N/m, margin {first.margin:g}, at up to {first.ceiling:.0f} Pa\n'
+        )
+        _print_rows(_OF_DESIGNS, [*named, *({'name': 'other radius'} | row for row in rows)])
+    return {'designs': named, 'radii': rows, 'says': list(advice(first))}
 
 
-def _ceiling(options: argparse.Namespace, foot: Foot | None) -> float:
-    own = CEILING if foot is None else foot.ceiling
-    return own if options.pressure is None else float(options.pressure)
-
-
-def _of_materials(options: argparse.Namespace, foot: Foot | None, area: float) -> dict[str, Any]:
+def _of_materials(options: argparse.Namespace, foot: Foot, area: float) -> dict[str, Any]:
     """Design pads of materials and thicknesses; return what JSON has."""
     if options.stiffness is not None:
         raise InvalidInput('--stiffness is not allowed with a material, which has its own')
-    radius = options.radius
-    if radius is None:
-        radius = LARGE_PAD.radius if foot is None else foot.pad.radius
-    built = foot is not None and (radius, area) == (foot.pad.radius, foot.sole_area)
-    own = foot if options.material is None else None  # the foot whose material is asked for
+    radius = foot.pad.radius if options.radius is None else options.radius
     limit, measured = MATERIAL_CRITERION, None
-    if own is None or own.pad.material is None:
-        names = options.material
-        names = configuration.names('materials') if names == ['all'] else names
+    if options.material is not None:
+        every = options.material == ['all']
+        names = configuration.names('materials') if every else options.material
         materials, sheets = [Material.load(name) for name in names], [radius * s for s in SHEETS]
+        ceiling = Foot.load(USUAL).ceiling
     else:
-        materials, sheets = [own.pad.material], [own.pad.thickness]
+        assert foot.pad.material is not None and foot.pad.thickness is not None
+        materials, sheets = [foot.pad.material], [foot.pad.thickness]
+        ceiling = foot.ceiling
         # A limit that was measured holds for its own pad alone.
-        if (radius, options.thickness) == (own.pad.radius, None):
-            measured = own.pad.measured_limit
-        if own.limit != 'measured' or measured is not None:
-            limit = own.limit
+        if (radius, options.thickness) == (foot.pad.radius, None):
+            measured = foot.pad.measured_limit
+        if foot.limit != 'measured' or measured is not None:
+            limit = foot.limit
     rules: dict[str, Any] = {
-        'ceiling': _ceiling(options, own),
+        'ceiling': ceiling if options.pressure is None else options.pressure,
         'margin': options.margin,
         'criterion': options.criterion or limit,
     }
@@ -163,14 +156,15 @@ def _of_materials(options: argparse.Namespace, foot: Foot | None, area: float) -
         materials,
         options.thickness or sheets,
         radius,
-        pads=foot.pads if built and foot else None,
+        pads=_as_built(options, foot, radius, area),
         measured_limit=measured,
         **rules,
     )
     if options.figure is not None:
         from ros_pad.reports.design import draw_candidates
+        from ros_pad.reports.files import write_picture
 
-        draw_candidates(options.figure, found, rules['ceiling'])
+        write_picture(options.figure, lambda: draw_candidates(found, rules['ceiling']))
     rows = [candidate_values(each) for each in found]
     if not options.json:
         print(f'{found[0].pads} pads of radius {radius:g} m\n')
@@ -262,19 +256,17 @@ def advice(each: Design) -> Iterator[str]:
 
 # Heads of the printed tables, by the names of values in JSON.
 _OF_DESIGNS = {
+    'name': '',
+    'radius_m': 'radius, m',
     'pads': 'pads',
     'pitch_m': 'pitch, m',
-    'load_per_pad_n': 'load per pad, N',
-    'pressure_pa': 'pressure needed, Pa',
-    'ceiling_pa': 'ceiling, Pa',
-    'reachable_load_n': 'reachable load, N',
-    'dome_width_m': 'width of the domes, m',
-    'touching': 'domes touch',
-    'rise_height_m': 'height of rise, m',
-    'carried': 'load carried',
+    'load_per_pad_n': 'on a pad, N',
+    'pressure_pa': 'needed, Pa',
+    'reachable_load_n': 'reach, N',
+    'rise_height_m': 'rise, m',
+    'criterion': 'limit',
+    'carried': 'carried',
 }
-_OF_RADII = {'radius_m': 'radius, m', 'pads': 'pads', 'pressure_pa': 'Pa'}
-_OF_RADII |= {'reachable_load_n': 'reach, N', 'rise_height_m': 'rise, m'}
 _OF_CANDIDATES = {
     'material': 'material',
     'thickness_m': 'sheet, m',
@@ -287,22 +279,8 @@ _OF_CANDIDATES = {
 }
 
 
-def _print(designs: dict[str, Design], rows: Sequence[Design]) -> None:
-    first = next(iter(designs.values()))
-    print(
-        f'{first.load:g} N on a sole of {first.area:.4g} m², pads of radius {first.pad.radius:g} '
-        f'm and {first.pad.stiffness:g} N/m, limit {first.criterion}, margin {first.margin:g}\n'
-    )
-    table = [values(each) for each in designs.values()]
-    lines = [[text, *(_text(one[key]) for one in table)] for key, text in _OF_DESIGNS.items()]
-    print_table(('', *designs), lines)
-    if rows:
-        print(f'\nother radii, limit {rows[0].criterion}')
-        _print_rows(_OF_RADII, [values(each) for each in rows], texts=0)
-
-
-def _print_rows(heads: dict[str, str], rows: Sequence[dict[str, Any]], texts: int = 1) -> None:
-    print_table([*heads.values()], [[_text(row[name]) for name in heads] for row in rows], texts)
+def _print_rows(heads: dict[str, str], rows: Sequence[dict[str, Any]]) -> None:
+    print_table([*heads.values()], [[_text(row[name]) for name in heads] for row in rows])
 
 
 def _margin(row: dict[str, Any]) -> str:

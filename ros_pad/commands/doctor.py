@@ -62,10 +62,11 @@ With --robot, look at the sensors of a robot instead, live or in a bag: what is
 missing, rates, stamps, units, axes and signs of IMU, joints and foot forces.
 Let the robot stand for two seconds, then walk some steps."""
 _EXAMPLES = """\
-pad doctor
-pad doctor --json
-pad doctor --robot go2 --mapping go2
-pad doctor --robot my_robot.urdf --feet lf_foot rf_foot lh_foot rh_foot --bag my_bag"""
+For example:
+  pad doctor
+  pad doctor --json
+  pad doctor --robot go2 --mapping go2
+  pad doctor --robot my_robot.urdf --feet lf_foot rf_foot lh_foot rh_foot --bag my_bag"""
 _INSTALL = 'pip install --editable . in the folder of ros_pad, or rosdep install'
 _ONE_ROS = (
     'one ROS 2 at a time: open a new shell and either source /opt/ros/jazzy/setup.bash or'
@@ -98,7 +99,7 @@ class Finding(NamedTuple):
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(commands, 'doctor', run, _DESCRIPTION, _EXAMPLES)
+    part = add_command(commands, 'doctor', run, f'{_DESCRIPTION}\n\n{_EXAMPLES}')
     part.add_argument('--json', action='store_true', help='print one JSON object')
     group = part.add_argument_group('sensors of a robot')
     group.add_argument(

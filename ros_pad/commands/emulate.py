@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad emulate``: emulate a regulator on a pseudo-terminal."""
+"""Emulate a pressure regulator on a pseudo-terminal until Ctrl-C; print its path.
+
+For example:
+  pad emulate alicat --unit-ids ABCDEF --link /tmp/regulators --fault silence:10:12
+"""
 
 from __future__ import annotations
 
@@ -22,17 +26,9 @@ OPTIONS = (
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(
-        commands,
-        'emulate',
-        run,
-        'Emulate a pressure regulator on a pseudo-terminal until Ctrl-C; print its path.',
-        'pad emulate alicat --unit-ids ABCDEF --link /tmp/regulators --fault silence:10:12',
-    )
-    part.epilog = '\n'.join(
-        [f'faults of {name}: {", ".join(EMULATORS[name].FAULTS)}' for name in EMULATORS]
-        + ['', str(part.epilog)]
-    )
+    part = add_command(commands, 'emulate', run, __doc__)
+    faults = (f'faults of {name}: {", ".join(each.FAULTS)}' for name, each in EMULATORS.items())
+    part.epilog = '\n'.join([*faults, '', str(part.epilog)])
     part.add_argument('device', choices=sorted(EMULATORS), help='backend whose device is emulated')
     part.add_argument(
         '--link', metavar='PATH', help='new symbolic link to the port, which may change its name'

@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad explore``: a foot designed by looking, on a page in the browser."""
+"""Show a foot on a page in the browser.
+
+Dome, sole, grip, force limit and switching time follow the sliders. The page is served to this
+machine alone, until Ctrl-C.
+
+For example:
+  pad explore
+  pad explore small217
+"""
 
 from __future__ import annotations
 
@@ -13,11 +21,7 @@ from ros_pad.contact import Foot
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Show a foot on a page in the browser: dome, sole, grip, force limit and switching time'
-        ' follow the sliders. The page is served to this machine alone, until Ctrl-C.'
-    )
-    part = add_command(commands, 'explore', run, text, 'pad explore\npad explore small217')
+    part = add_command(commands, 'explore', run, __doc__)
     add = part.add_argument
     foot: dict[str, Any] = {'metavar': 'FOOT', 'nargs': '?', 'default': 'large37'}
     add('foot', help='to begin with: a name in config/feet or YAML file (large37)', **foot)

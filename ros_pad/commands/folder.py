@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
+from ros_pad.configuration import choice
 from ros_pad.errors import InvalidInput, PadError
 
 PICTURES = ('.png', '.svg', '.pdf')
@@ -31,17 +33,34 @@ def new_folder(wanted: pathlib.Path | None, name: str) -> pathlib.Path:
             return folder
 
 
-def refuse_existing(option: str, path: pathlib.Path | None, endings: Sequence[str] = ()) -> None:
-    """Raise InvalidInput if the path that an option gives exists, or lacks one of the endings."""
-    if path is None:
-        return
-    if endings and path.suffix not in endings:
-        raise InvalidInput(f'{option} {path}: a name that ends in {", ".join(endings)} is needed')
-    if path.exists():
+@contextmanager
+def kept_if_filled(folder: pathlib.Path) -> Iterator[None]:
+    """Remove a folder that is empty after the block, so that its name can be used again."""
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def refuse_existing(option: str, path: pathlib.Path | None) -> None:
+    """Raise InvalidInput if the path that an option gives exists."""
+    if path is not None and path.exists():
         raise InvalidInput(f'{option} {path}: exists already: give another name')
 
 
-def check_pictures(*paths: object) -> None:
-    """Raise ConfigError if the path of a picture is given and Matplotlib is missing."""
-    if any(path is not None for path in paths):
+def check_picture(path: pathlib.Path | None) -> None:
+    """Check what ``--figure`` gives before the work begins: a new file of a kind that is known.
+
+    Raises
+    ------
+    InvalidInput
+        When the path exists, or does not end in .png, .svg or .pdf.
+    ConfigError
+        When Matplotlib is missing.
+    """
+    if path is not None:
         import ros_pad.reports  # noqa: F401
+
+        choice('ending of --figure', path.suffix, PICTURES)
+        refuse_existing('--figure', path)

@@ -13,13 +13,12 @@ from ros_pad.pace import Progress
 
 
 @contextmanager
-def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterator[Progress]:
+def bar(text: str, total: float, unit: str = 's') -> Iterator[Progress]:
     """Show a progress bar on stderr; yield the function that sets its position, 0 to ``total``.
 
-    The bar ends full unless an exception ends the block. Where stderr is no terminal, it is shown
-    once a minute. With ``delay``, s, it is shown after that time, and only on a terminal.
+    It is shown from 1 s on, and once a minute where stderr is no terminal. It ends full unless an
+    exception ends the block.
     """
-    terminal = sys.stderr.isatty()
     with tqdm(
         total=total,
         desc=text,
@@ -27,18 +26,18 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
         bar_format='{desc} {percentage:3.0f}% {bar} {n:.0f}/{total:.0f} {unit} '
         '[{elapsed}<{remaining}]',
         file=sys.stderr,
-        delay=delay or 1.0,  # nothing is written before this block can end its line
-        mininterval=0.1 if terminal else 60.0,
+        delay=1.0,
+        mininterval=0.1 if sys.stderr.isatty() else 60.0,
         miniters=0,
         smoothing=0.0,  # time left from the mean rate: others are wrong if reports are rare
-        disable=delay > 0.0 and not terminal,
     ) as shown:
-        if not delay:
-            shown.delay = 0.0
-            shown.refresh()
 
         def show(place: float) -> None:
             shown.update(place - shown.n)
 
-        yield show
+        try:
+            yield show
+        except KeyboardInterrupt:
+            shown.delay = 0.0  # its line ends, also where it is just being written
+            raise
         shown.update(total - shown.n)

@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad replay``: pass a bag through estimators and controller again, and compare."""
+"""Pass a bag through estimators and controller again, and compare the results with those recorded.
+
+The motion stays as recorded: only estimates and decisions may change, as with other parameters
+(--set), such as force_noise (N), expected_load (N), dome_pressure (Pa gauge) or policy.dwell
+(steps). --remap is for one leg (leg_1/wrench:=/left/ft) or for all, with {leg} for the number.
+Exit status: 0 no difference except for rounding or after a gap in the recording; 1 another
+difference; 2 bad input.
+
+For example:
+  pad replay bags/hexapod_patches/bag --set wet_prior=0.3 --figure prior.png
+  pad replay my_bag --remap leg_{leg}/wrench:=/foot_{leg}/ft
+"""
 
 from __future__ import annotations
 
@@ -7,9 +18,10 @@ import argparse
 import json
 import math
 import pathlib
+from typing import Any
 
 from ros_pad.commands.command import FILE, FOLDER, Commands, add_command, complain, print_table
-from ros_pad.commands.folder import PICTURES, check_pictures, refuse_existing
+from ros_pad.commands.folder import check_picture, refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.commands.sweep import pairs, typed
 from ros_pad.control import POLICIES
@@ -29,40 +41,16 @@ WORDS = {
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Pass recorded wrenches (N), positions (m) and pressures (Pa) through estimators and '
-        'controller again, and compare the results with the recorded ones; try other parameters.\n'
-        'The motion stays as recorded: only estimates and decisions may change.\nExit status: 0 no'
-        ' difference except for rounding or after a gap in the recording; 1 another difference; 2 '
-        'bad input.'
-    )
-    example = (
-        'pad replay bags/hexapod_patches/bag --set wet_prior=0.3 --figure prior.png\n'
-        'pad replay my_bag --remap leg_{leg}/wrench:=/foot_{leg}/ft'
-    )
-    part = add_command(commands, 'replay', run, text, example)
+    part = add_command(commands, 'replay', run, __doc__)
     add = part.add_argument
     add('bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file')
-    add(
-        '--set',
-        action='append',
-        default=[],
-        metavar='NAME=VALUE',
-        help='another value, in SI units, for a parameter of the estimator or controller node: '
-        'such as force_noise (N), expected_load (N), dome_pressure (Pa gauge) or policy.dwell '
-        '(steps); may be given more than once',
-    )
+    several: dict[str, Any] = {'action': 'append', 'default': []}
+    text = 'another value of a parameter of estimator or controller, SI; may be repeated'
+    add('--set', metavar='NAME=VALUE', help=text, **several)
     add('--policy', choices=POLICIES, help="chooses morphologies (default: the bag's)")
     add('--foot', help="other than the bag's: a name in config/feet or a YAML file")
-    add(
-        '--remap',
-        action='append',
-        default=[],
-        metavar='NAME:=TOPIC',
-        help='read NAME of ros_pad from this TOPIC of the bag, for one leg '
-        "(leg_1/wrench:=/left/ft) or for all legs, with '{leg}' for the number "
-        "('leg_{leg}/wrench:=/foot_{leg}/ft'); may be given more than once",
-    )
+    text = 'read NAME of ros_pad from this TOPIC of the bag, see above; may be repeated'
+    add('--remap', metavar='NAME:=TOPIC', help=text, **several)
     add('--namespace', help='of the robot, such as /robot_1 (default: the only one)')
     text = 'draw P(wet) and set-points, recorded and replayed, into a new .png, .svg or .pdf'
     add('--figure', help=text, **FILE)
@@ -74,11 +62,10 @@ def run(options: argparse.Namespace) -> int:
     """Replay the bag; return the exit status."""
     remaps = pairs('--remap', options.remap, ':=')
     values = {name: typed(text) for name, text in pairs('--set', options.set, '=').items()}
-    refuse_existing('--figure', options.figure, PICTURES)
-    check_pictures(options.figure)
+    check_picture(options.figure)
     refuse_existing('--out', options.out)
     try:
-        with bar('opening', 1.0, 'bag', delay=1.0) as show:
+        with bar('opening', 1.0, 'bag') as show:
             bag = open_bag(options.bag, show)
         settings = NodeSettings.of(bag).changed(values, options.policy, options.foot)
         with bar('replay', 1.0, 'bag') as show:
@@ -86,19 +73,20 @@ def run(options: argparse.Namespace) -> int:
     except BagError as error:
         return complain(error, 2)  # the bag is an input of this command
     if options.figure is not None:
+        from ros_pad.reports.files import write_picture
         from ros_pad.reports.replay import draw
 
-        draw(options.figure, found)
+        write_picture(options.figure, lambda: draw(found))
     if options.out is not None:
         with bar('writing', 1.0, 'bag') as show:
             replayed_bag.write(found, options.out, options.namespace, show)
-    written = {name: getattr(options, name) for name in ('figure', 'out')}
+    written = {'figure': options.figure, 'out': options.out}
+    paths = {name: path and str(path) for name, path in written.items()}
     if options.json:
-        paths = {name: None if path is None else str(path) for name, path in written.items()}
         print(json.dumps(found.as_dict() | paths))
     else:
         _show(found)
-        for path in filter(None, written.values()):
+        for path in filter(None, paths.values()):
             print(path)
     return 1 if found.verdict == 'different' else 0
 

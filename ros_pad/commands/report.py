@@ -1,5 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad report``: write the page of a bag, a sweep or the thesis' figures, and their figures."""
+"""Write the page of a bag, of a sweep, or of the thesis' figures; write figures for a paper.
+
+A page is one file that needs no network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide,
+with type of 8 points.
+
+For example:
+  pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures
+"""
 
 from __future__ import annotations
 
@@ -7,7 +14,7 @@ import argparse
 import os
 import pathlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ros_pad.commands.command import FILE, FOLDER, Commands, add_command
 from ros_pad.commands.progress import bar
@@ -26,16 +33,10 @@ THESIS = 'thesis_figures.html'
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Write the HTML report of a bag or of a sweep, or a page with the figures of the thesis '
-        'as ros_pad computes them; write figures for a paper.\nA page is one file that needs no '
-        'network. Figures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.'
-    )
-    example = 'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures'
-    part = add_command(commands, 'report', run, text, example)
+    part = add_command(commands, 'report', run, __doc__)
     add = part.add_argument
-    path: dict[str, Any] = FOLDER | {'metavar': 'PATH', 'nargs': '?'}
-    add('path', help='folder of a bag or of a sweep', **path)
+    text = 'folder of a bag or of a sweep'
+    add('path', nargs='?', type=pathlib.Path, metavar='PATH', help=text)
     text = "draw the thesis' figures, without PATH; needs a checkout of ros_pad and about 45 s"
     add('--thesis', action='store_true', help=text)
     text = f'page to write (default: report.html beside bag or sweep, or {THESIS} here)'
@@ -50,29 +51,25 @@ def run(options: argparse.Namespace) -> int:
     if options.thesis:
         if options.path is not None:
             raise InvalidInput(f'--thesis draws no bag or sweep: leave out {options.path}')
-        words = ['--force'] if options.force else []
-        for name in ('out', 'figures'):
-            value = getattr(options, name)
-            words += [f'--{name}', str(value)] if value is not None else []
-        return run_study('thesis', *words)
+        return run_study('thesis', out=options.out, figures=options.figures, force=options.force)
     if options.path is None:
         raise InvalidInput('PATH (folder of a bag or sweep) or --thesis is needed')
     if not options.path.exists():
         raise BagError(f'{options.path}: no such bag or sweep')
     from ros_pad.reports import report, sweep
 
-    if sweeps.is_sweep(options.path):
-        page = page_for(options, options.path / 'report.html')
-        found = sweeps.read(options.path)
+    where: pathlib.Path = options.path
+    if sweeps.is_sweep(where):
+        page, found = page_for(options, where / 'report.html'), sweeps.read(where)
         return write_all(
             options,
             page,
             lambda out: sweep.write(found, out, options.force),
             lambda: {'sweep': sweep.drawn(found)},
         )
-    page = page_for(options, pathlib.Path(os.path.normpath(options.path / '..' / 'report.html')))
+    page = page_for(options, pathlib.Path(os.path.normpath(where / '..' / 'report.html')))
     with bar('reading', 1.0, 'bag') as progress:
-        trial = recorded.load(options.path, progress=progress)
+        trial = recorded.load(where, progress=progress)
     return write_all(
         options,
         page,

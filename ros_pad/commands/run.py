@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad run``: walk a scene in closed loop."""
+"""Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report.
+
+For a bench scene, draw the figures of the thesis.
+
+For example:
+  pad run hexapod_patches --seed 3
+"""
 
 from __future__ import annotations
 
@@ -14,8 +20,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from ros_pad.bags import annotate
-from ros_pad.commands.command import FILE, FOLDER, INTERRUPTED, Commands, add_command, complain
-from ros_pad.commands.folder import new_folder
+from ros_pad.commands.command import FILE, FOLDER, Commands, add_command, complain, print_table
+from ros_pad.commands.folder import kept_if_filled, new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
 from ros_pad.configuration import integer, number
@@ -23,7 +29,7 @@ from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import ConfigError, InvalidInput, PadError
 from ros_pad.estimation.tuning import SOURCES
-from ros_pad.signals import STOP
+from ros_pad.signals import INTERRUPTED, STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.robot import check_reach
 from ros_pad.simulation.scene import Scene, is_bench
@@ -34,57 +40,45 @@ from ros_pad.trials.others import Others
 from ros_pad.trials.trial import fault_lines
 
 _DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-# Options of a walk with their defaults, in the order in which they are refused without one.
-_WALK = {
-    'policy': None,
-    'cycles': None,
-    'seed': 0,
-    'fidelity': 'auto',
-    'sensing': 'markers',
-    'learnt': None,
-    'no_ros': False,
-    'no_compare': False,
-    'live': False,
-}
 
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report; for a bench '
-        'scene, draw the figures of the thesis.'
-    )
-    part = add_command(commands, 'run', run, text, 'pad run hexapod_patches --seed 3')
+    part = add_command(commands, 'run', run, __doc__)
     add = part.add_argument
     add('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
     add('--foot', help="other than the scene's: a name in config/feet or a YAML file")
-    add('--policy', choices=POLICIES, help="chooses morphologies (default: the scene's)")
-    add('--seed', type=int, default=0, help='seed of floor and noise (default 0)')
-    add('--cycles', type=int, help="gait cycles (default: the scene's)")
-    text = (
-        'L0: leg on a rail, L1: robot in the plane, L2: with joints; auto: cheapest that will do'
-    )
-    add('--fidelity', choices=levels.FIDELITIES, default='auto', help=text)
-    text = 'what slip is estimated from; joints, with IMU and forces as robots have them, needs L2'
-    add('--sensing', choices=SOURCES, default='markers', help=text)
-    add('--learnt', help='begin with the friction of learnt.yaml of an earlier trial', **FILE)
-    add('--no-ros', action='store_true', help='walk without nodes and bag; much faster')
-    text = 'do not also walk the other policies on the same ground, as an adaptive run does'
-    add('--no-compare', action='store_true', help=text)
-    text = 'share the topics, by default in the whole subnet: real regulators get the set-points'
-    add('--live', action='store_true', help=text)
     add('--out', help='new folder for the results (default: runs/<scene>_...)', **FOLDER)
     add('--json', action='store_true', help='print one JSON object')
+    add = part.add_argument_group('walk').add_argument
+    levels_text = (
+        'L0: leg on a rail, L1: in the plane, L2: with joints; auto: cheapest that will do'
+    )
+    sensing_text = (
+        'what slip is estimated from; joints, with IMU and forces as on robots, needs L2'
+    )
+    compare_text = 'do not walk the other policies on the same ground, as an adaptive run does'
+    live_text = 'share the topics, by default in the whole subnet: real regulators get set-points'
+    of_a_walk = [
+        add('--policy', choices=POLICIES, help="chooses morphologies (default: the scene's)"),
+        add('--cycles', type=int, help="gait cycles (default: the scene's)"),
+        add('--seed', type=int, default=0, help='seed of floor and noise (default 0)'),
+        add('--fidelity', choices=levels.FIDELITIES, default='auto', help=levels_text),
+        add('--sensing', choices=SOURCES, default='markers', help=sensing_text),
+        add('--learnt', help='begin with the friction of learnt.yaml of an earlier trial', **FILE),
+        add('--no-ros', action='store_true', help='walk without nodes and bag; much faster'),
+        add('--no-compare', action='store_true', help=compare_text),
+        add('--live', action='store_true', help=live_text),
+    ]
+    part.set_defaults(of_a_walk=of_a_walk)
 
 
 def run(options: argparse.Namespace) -> int:
     """Walk the scene, or run the study of a bench scene; return the exit status."""
     if is_bench(options.scene):
         _refuse_walk(options, f'{options.scene} is a bench scene, in which nothing walks')
-        words = ['--json'] if options.json else []
-        words += ['--foot', options.foot] if options.foot else []
-        words += ['--out', str(options.out)] if options.out else []
-        return run_study('bench', options.scene, *words)
+        given = {name: getattr(options, name) for name in ('foot', 'out', 'json')}
+        return run_study('bench', options.scene, **given)
     scene = Scene.load(options.scene)
     if options.cycles is not None:
         cycles = integer('--cycles', options.cycles, 1, 100000)
@@ -113,9 +107,10 @@ def run(options: argparse.Namespace) -> int:
     policies = () if options.no_compare or policy != 'adaptive' else POLICIES
     compared = [each for each in policies if each != policy]
     others = Others(scene, compared, options.seed, level, options.sensing, options.tuning)
+    # Real regulators may wait for set-points: nothing else takes their time.
+    beside = contextlib.nullcontext() if options.live else others.beside()
     try:
-        # Real regulators may wait for set-points: nothing else takes their time.
-        with contextlib.nullcontext() if options.live else others.beside():
+        with kept_if_filled(folder), beside:
             return _walk(others, folder, options, (scene, policy, options.seed, level))
     except KeyboardInterrupt:
         bag = folder / 'bag'
@@ -124,16 +119,13 @@ def run(options: argparse.Namespace) -> int:
         return complain(
             f'stopped: the bag is complete, pad report {bag} writes its report', INTERRUPTED
         )
-    finally:
-        # Remove the folder if it is empty, so that its name can be used again.
-        with contextlib.suppress(OSError):
-            folder.rmdir()
 
 
-def _refuse_walk(options: argparse.Namespace, why: str) -> None:
-    for name, default in _WALK.items():
-        if getattr(options, name) != default:
-            raise InvalidInput(f'--{name.replace("_", "-")} is not allowed: {why}')
+def _refuse_walk(options: argparse.Namespace, why: str, *allowed: str) -> None:
+    """Raise InvalidInput for an option of a walk that is not at its default."""
+    for each in options.of_a_walk:
+        if each.dest not in allowed and getattr(options, each.dest) != each.default:
+            raise InvalidInput(f'{each.option_strings[0]} is not allowed: {why}')
 
 
 def _answer(
@@ -141,9 +133,8 @@ def _answer(
 ) -> int:
     """Print the distance of a scene that needs no walk; refuse options of a walk."""
     walks = f'--fidelity {levels.level(scene, policy=policy)} walks it'
-    asked = argparse.Namespace(**vars(options) | {'policy': None, 'cycles': None})
     why = f'{scene.name} requires its {scene.metric} alone, for which nothing is simulated'
-    _refuse_walk(asked, f'{why}; {walks}')
+    _refuse_walk(options, f'{why}; {walks}', 'policy', 'cycles')
     if options.out:
         raise InvalidInput(f'--out is not allowed: {why}; {walks}')
     far = levels.sticking_distance(scene)
@@ -163,7 +154,7 @@ def _walk(
     given: tuple[Scene, str, int, str],
 ) -> int:
     """Walk scene, policy, seed and level of ``given``; write report and summary."""
-    scene, policy, seed, level = given
+    scene, policy, *_ = given
     bag = None if options.no_ros else folder / 'bag'
     if bag is None:
         with bar(f'{policy}, without ROS', scene.duration) as progress:
@@ -183,10 +174,7 @@ def _walk(
     ]
     if bag is not None:
         about = labels.label(
-            scene,
-            policy,
-            seed,
-            level,
+            *given,
             metrics=trial.metrics,
             real_time_factor=trial.real_time_factor,
             comparison=trial.settings['comparison'],
@@ -221,7 +209,7 @@ def _walk_on_nodes(
             ' pip install "ros_pad[ros]", or run without ROS: --no-ros'
         ) from error
     with (
-        contextlib.nullcontext() if options.live else alone(),
+        contextlib.nullcontext() if options.live else _alone(),
         bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
     ):
         return composed.run(
@@ -243,16 +231,15 @@ def _write_report(trial: Trial, page: pathlib.Path) -> pathlib.Path | None:
 
 
 @contextlib.contextmanager
-def alone() -> Iterator[None]:
+def _alone() -> Iterator[None]:
     """Hide the topics of this process, so that no real regulator receives the set-points."""
     before = os.environ.get(_DISCOVERY)
     os.environ[_DISCOVERY] = 'OFF'
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[_DISCOVERY]
-        else:
+        del os.environ[_DISCOVERY]
+        if before is not None:
             os.environ[_DISCOVERY] = before
 
 
@@ -278,12 +265,9 @@ def _at_most(term: dict[str, Any]) -> str:
     if term['bound'] is None:
         return 'no bound known'
     often = '95 of 100 times ' if term['kind'] == 'promise' else ''
-    text = f'{often}at most {100.0 * term["bound"]:.1f} %'
-    text += f' {re.split("[:;,]", term["reason"])[0]}'
-    if term['exceeds']:
-        share = f'about {100.0 * term["effect"]:.0f} %' if term['effect'] <= 1.0 else 'all'
-        text += f', {share} of the result: exceeds the accuracy required'
-    return text
+    of_what = re.split('[:;,]', term['reason'])[0]
+    text = f'{often}at most {100.0 * term["bound"]:.1f} % {of_what}'
+    return text + (', exceeds the accuracy required' if term['exceeds'] else '')
 
 
 def _show(trial: Trial) -> None:
@@ -300,16 +284,16 @@ def _show(trial: Trial) -> None:
             seconds = row['time_to_goal_s']
             after = 'not reached' if seconds is None else f'after {seconds:.1f} s'
             print(f'{row["policy"]}: goal of {row["goal_m"]:g} m {after}')
-    print(f'policy      mm/cycle  against {trial.policy:8}   slip path per foot   switches')
+    table = []
     for row in rows:
         advance, gain = row['distance_per_cycle_m'], ''
         if row is not rows[0] and own.distance_per_cycle_m:
             gain = f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+.0f} %'
         slip = sum(row['slip_path_m']) / len(row['slip_path_m'])
-        print(
-            f'{row["policy"]:10} {1e3 * advance:9.1f}  {gain:>16}'
-            f' {slip:18.2f} m {sum(row["switches"]):10d}'
-        )
+        switches = str(sum(row['switches']))
+        table.append([row['policy'], f'{1e3 * advance:.1f}', gain, f'{slip:.2f} m', switches])
+    against = f'against {trial.policy}'
+    print_table(['policy', 'mm/cycle', against, 'slip path per foot', 'switches'], table)
     taken = ', '.join(term['term'] for term in settings['taken'])
     print(
         *(f'stayed flat: {refusal}' for refusal in own.refusals),

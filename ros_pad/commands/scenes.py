@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad scenes``: list the scenes."""
+"""List the scenes.
+
+For example:
+  pad scenes
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from ros_pad.simulation.scene import Scene, is_bench
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(commands, 'scenes', run, 'List the scenes.', 'pad scenes')
+    part = add_command(commands, 'scenes', run, __doc__)
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 

@@ -11,8 +11,10 @@ import sys
 from ros_pad.errors import PadError
 
 
-def run_study(*words: str) -> int:
-    """Run ``python -m studies`` with these words; return its exit status.
+def run_study(*words: str, **options: object) -> int:
+    """Run ``python -m studies`` with these words and options; return its exit status.
+
+    Options that are None or False are left out; those that are True have no value.
 
     Raises
     ------
@@ -25,6 +27,9 @@ def run_study(*words: str) -> int:
             f'study {words[0]!r} is not installed: studies are only in the source. Clone ros_pad'
             f' and run in its folder: python -m studies {" ".join(words)}'
         )
+    for name, value in options.items():
+        if value is not None and value is not False:
+            words += (f'--{name}',) if value is True else (f'--{name}', str(value))
     path = os.pathsep.join(filter(None, (str(checkout), os.environ.get('PYTHONPATH'))))
     command = [sys.executable, '-m', 'studies', *words]
     return subprocess.run(command, env=os.environ | {'PYTHONPATH': path}).returncode

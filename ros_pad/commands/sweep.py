@@ -1,5 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad sweep``: run every combination of scenes, policies, seeds and parameters."""
+r"""Run every combination of scenes, policies, seeds and parameters, without ROS.
+
+It runs on all cores or on a Dask cluster, and writes trials.csv, a picture with confidence
+intervals, and a page. A sweep that was stopped or killed continues when the same command is given
+again with --out and its folder; seeds, policies, scenes and values may be added.
+
+NAME of --set is a key of the scene's YAML, with dots between levels (tow.weight, N; cycles), or a
+parameter of the estimator node (filter_period, s) or of the adaptive policy (policy.wet_above).
+The first NAME with several values is the axis of the picture.
+
+For example:
+  pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 \
+      --set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing
+"""
 
 from __future__ import annotations
 
@@ -15,53 +28,30 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.commands.command import (
-    FOLDER,
-    INTERRUPTED,
-    Commands,
-    add_command,
-    complain,
-    print_table,
-)
-from ros_pad.commands.folder import new_folder
+from ros_pad.commands.command import FOLDER, Commands, add_command, complain, print_table
+from ros_pad.commands.folder import kept_if_filled, new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import integer
 from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.signals import INTERRUPTED
 from ros_pad.simulation import fidelity as levels
 from ros_pad.trials import sweep as sweeps
 
+TABLES = ('.csv', '.parquet')
 LINES = 60  # largest number of rows of the table on the screen
 MOST = 100_000  # largest number of values in a range, and of seeds in FIRST:LAST
 
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    text = (
-        'Run every combination of scenes, policies, seeds and parameters, without ROS, on all '
-        'cores or on a Dask cluster; write trials.csv, a picture with confidence intervals, and a '
-        'page.\nA sweep that was stopped or killed continues when the same command is given again '
-        'with --out and its folder; seeds, policies, scenes and values may be added.'
-    )
-    example = (
-        'pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 '
-        '--set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing'
-    )
-    part = add_command(commands, 'sweep', run, text, example)
+    part = add_command(commands, 'sweep', run, __doc__)
     add = part.add_argument
     add('scenes', metavar='SCENE', nargs='+', help='names of scenes, or YAML files')
     add('--policy', metavar='NAMES', help="flat,dome,adaptive,oracle (default: each scene's own)")
     text = 'seeds of floor and noise, with commas, or FIRST:LAST (default 0:4)'
     add('--seed', default='0:4', metavar='LIST', help=text)
-    add(
-        '--set',
-        action='append',
-        default=[],
-        metavar='NAME=VALUES',
-        help='values with commas, or START:STOP:COUNT with both ends, in SI units. NAME is a key '
-        "of the scene's YAML, with dots between levels (tow.weight, N; cycles), or a parameter of "
-        'the estimator node (filter_period, s) or of the adaptive policy (policy.wet_above). May '
-        'be given more than once; the first NAME with several values is the axis of the picture',
-    )
+    text = 'values with commas, or START:STOP:COUNT with both ends, SI; may be repeated'
+    add('--set', action='append', default=[], metavar='NAME=VALUES', help=text)
     add('--fidelity', choices=levels.FIDELITIES, default='auto', help='level; auto chooses it')
     where = part.add_mutually_exclusive_group()
     where.add_argument('--workers', type=int, help='number of processes (default: one for a core)')
@@ -84,28 +74,13 @@ def run(options: argparse.Namespace) -> int:
     total = len(sweep.jobs())  # invalid input is an error before a folder is created
     folder = new_folder(None, 'sweep') if options.out is None else options.out
     print(f'{total} trials; after a stop, --out {folder} continues them', file=sys.stderr)
-    done = 0.0
     try:
-        with bar('sweep', total, 'trials') as show:
-
-            def progress(now: float) -> None:
-                nonlocal done
-                done = now
-                show(now)
-
+        with kept_if_filled(folder), bar('sweep', total, 'trials') as show:
             rows = sweeps.run(
-                sweep, folder, options.workers, options.scheduler, progress, options.retry
+                sweep, folder, options.workers, options.scheduler, show, options.retry
             )
     except KeyboardInterrupt:
-        return complain(
-            f'stopped: {done:.0f} of {total} trials are in {folder};'
-            f' the same command with --out {folder} continues',
-            INTERRUPTED,
-        )
-    finally:
-        # Remove the folder if it is empty, so that its name can be used again.
-        with contextlib.suppress(OSError):
-            folder.rmdir()
+        return complain(f'stopped: --out {folder} continues what is done there', INTERRUPTED)
     return _report(options, folder, rows)
 
 
@@ -131,14 +106,14 @@ def _report(options: argparse.Namespace, folder: pathlib.Path, rows: list[sweeps
         picture = folder / 'sweep.png'
     except (ConfigError, InvalidInput) as error:
         notes.append(f'no picture: {error}')
-    tables = [each for each in folder.glob('trials.*') if each.suffix in ('.csv', '.parquet')]
+    tables = sorted(str(each) for each in folder.glob('trials.*') if each.suffix in TABLES)
     if options.json:
         summary = {
             'folder': str(folder),
             'trials': len(rows),
             'failed': len(failed),
             'ended_early': len(ended),
-            'tables': sorted(map(str, tables)),
+            'tables': tables,
             'picture': picture and str(picture),
             'report': report and str(report),
             'notes': notes,
@@ -147,7 +122,7 @@ def _report(options: argparse.Namespace, folder: pathlib.Path, rows: list[sweeps
         print(json.dumps(summary))
     else:
         _show(points)
-        print(*notes, *sorted(tables), *filter(None, (picture, report)), sep='\n')
+        print(*notes, *tables, *filter(None, (picture, report)), sep='\n')
     if failed:
         words = f'{len(failed)} of {len(rows)} trials failed, the first with: {failed[0]}'
         return complain(words, 1)
@@ -204,10 +179,9 @@ def _spaced(text: str, parts: Sequence[sweeps.Value]) -> list[sweeps.Value]:
         raise InvalidInput(f'--set {text}: a STOP other than START is needed')
     # Round to twelve digits: 0.3, not 0.30000000000000004.
     spaced = [float(f'{each:.12g}') for each in np.linspace(start, stop, int(count))]
-    whole = isinstance(start, int) and isinstance(stop, int)
-    if whole and all(each.is_integer() for each in spaced):
+    if isinstance(start, int) and isinstance(stop, int) and all(map(float.is_integer, spaced)):
         return [int(each) for each in spaced]
-    return list(spaced)
+    return [*spaced]
 
 
 def typed(text: str) -> sweeps.Value:
@@ -225,18 +199,18 @@ def _flat(point: sweeps.Point) -> dict[str, Any]:
 
 
 def _show(points: list[sweeps.Point]) -> None:
-    several = {
-        name: len({str(point.labels[name]) for point in points}) > 1 for name in points[0].labels
-    }
-    names = ['scene', *(n for n in several if several[n] and n not in ('scene', 'policy'))]
+    """Print a row for each condition, with the parameters that have several values."""
+    labels = [point.labels for point in points]
+    several = [name for name in labels[0] if len({str(each[name]) for each in labels}) > 1]
+    names = ['scene', *(each for each in several if each not in ('scene', 'policy')), 'policy']
     table = []
     for point in points[:LINES]:
         ends = [f'{1e3 * end:.1f}' for end in (point.low, point.high) if end is not None]
         mean = '-' if point.mean is None else f'{1e3 * point.mean:.1f}'
-        cells = [_cell(point.labels[name]) for name in (*names, 'policy')]
+        cells = [_cell(point.labels[name]) for name in names]
         table.append([*cells, mean, ' to '.join(ends) or '-', str(point.walks)])
     print()
-    print_table([*names, 'policy', 'mm/cycle', '95 % interval', 'walks'], table, len(names) + 1)
+    print_table([*names, 'mm/cycle', '95 % interval', 'walks'], table, len(names))
     if len(points) > LINES:
         print(f'... and {len(points) - LINES} more')
     print()

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import matplotlib
@@ -14,65 +13,59 @@ from matplotlib.figure import Figure
 
 from ros_pad.contact.calibrate import Calibration
 from ros_pad.contact.dome import BURST, inflate
-from ros_pad.contact.fits import Residual
 from ros_pad.contact.pad import Array, Pad, with_constant
 from ros_pad.reports.style import BLUE, PALE, STYLE, VERMILION
 
-_MARKS = {'height': 'o', 'depth': 'v', 'contact_radius': 's', 'gap': '^', 'force_limit': 'o'}
+_MARKS = {'height': 'o', 'depth': 'v', 'contact_radius': 's', 'gap': '^', 'force_limit': 'D'}
 
 
 def draw(calibration: Calibration) -> Figure:
-    """Return the picture: one column for each kind of measurement, fit above, residuals below."""
-    rows: dict[str, list[Residual]] = {}
-    for row in calibration.residuals:
-        kind = {'force_limit': 'force limit', 'tangential_force': 'friction'}.get(row.quantity)
-        rows.setdefault(kind or 'shape', []).append(row)
+    """Return the picture: a panel for each kind of measurement, and one of all residuals."""
+    measured = {row.quantity for row in calibration.residuals}
+    panels = [_shape] if len(calibration.measurements.free.pressure) else []
+    panels += [_limit] if 'force_limit' in measured else []
+    panels += [_friction] if 'tangential_force' in measured else []
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.6 * len(rows), 6.2), layout='constrained')
-        panels = figure.subplots(2, len(rows), squeeze=False, height_ratios=[3, 2])
-        for (kind, found), above, below in zip(rows.items(), *panels, strict=True):
-            above.set_title(kind)
-            if kind == 'shape' and len(calibration.measurements.free.pressure):
-                _shape(calibration, above)
-            elif kind == 'force limit':
-                _limit(calibration, above)
-            else:
-                scale, unit = (1.0, 'N') if kind == 'friction' else (1e3, 'mm')
-                _points(above, found, [(scale * r.measured, scale * r.modelled) for r in found])
-                end = 1.05 * max(above.get_xlim()[1], above.get_ylim()[1])
-                above.plot([0.0, end], [0.0, end], color=PALE, lw=1, zorder=0)
-                above.set(xlim=(0.0, end), ylim=(0.0, end))
-                above.set(xlabel=f'measured, {unit}', ylabel=f'model, {unit}')
-            above.legend(loc='upper left')
-            below.axhline(0.0, color=PALE, lw=1, zorder=0)
-            friction = kind == 'friction'
-            places = [r.measured if friction else r.pressure / 1e3 for r in found]
-            errors = [100.0 * r.error for r in found]
-            _points(below, found, list(zip(places, errors, strict=True)))
-            x = 'measured tangential force, N' if friction else 'gauge pressure, kPa'
-            below.set(xlabel=x, ylabel='model over measured − 1, %')
-            if kind == 'shape':
-                below.legend(title='filled: fitted', title_fontsize=7.5, fontsize=7.5)
+        figure = Figure(figsize=(4.6 * len(panels) + 4.6, 3.9), layout='constrained')
+        for panel, axes in zip(
+            (*panels, _residuals),
+            figure.subplots(1, len(panels) + 1, squeeze=False)[0],
+            strict=True,
+        ):
+            panel(calibration, axes)
+            axes.legend(loc='upper left')
     return figure
 
 
-def _points(panel: Axes, rows: Sequence[Residual], points: Sequence[tuple[float, float]]) -> None:
-    """Draw a point for each row, with one entry of the legend for each look."""
+def _residuals(calibration: Calibration, panel: Axes) -> None:
+    """Draw how far the model is from all that was measured; filled: fitted."""
     seen = set()
-    for row, point in zip(rows, points, strict=True):
-        first, *words = row.setting.split(', ')
-        if row.quantity == 'tangential_force':
-            first, dry = first.split()[0], words[0] == 'dry'
-            mark, filled, label = 'o' if dry else 's', not dry, f'{first}, {words[0]}'
-        else:
-            mark, filled = _MARKS[row.quantity], row.used
-            label = row.quantity.replace('_', ' ')
-            if words:
-                label += ', free' if first == 'free' else ', pressed'
-        colour = BLUE if first == 'domes' or 'pressed' in label else VERMILION
-        look: dict[str, Any] = {'fillstyle': 'full' if filled else 'none', 'color': colour}
-        panel.plot(*point, mark, **look, label='_' if label in seen else label)
+    for row in calibration.residuals:
+        look: dict[str, Any] = {'fillstyle': 'full' if row.used else 'none'}
+        look['color'] = BLUE if row.used else VERMILION
+        label = row.quantity.replace('_', ' ') + ('' if row.used else ', not fitted')
+        mark = _MARKS.get(row.quantity, 'P')
+        own = '_' if label in seen else label
+        panel.plot(row.pressure / 1e3, 100.0 * row.error, mark, label=own, **look)
         seen.add(label)
+    panel.axhline(0.0, color=PALE, lw=1, zorder=0)
+    panel.set(title='residuals', xlabel='gauge pressure, kPa')
+    panel.set(ylabel='model over measured − 1, %')
+
+
+def _friction(calibration: Calibration, panel: Axes) -> None:
+    """Draw modelled over measured forces, flat and domed, dry and wet."""
+    rows = [row for row in calibration.residuals if row.quantity == 'tangential_force']
+    for domed, colour in ((False, VERMILION), (True, BLUE)):
+        for surface, mark in (('dry', 'o'), ('wet', 's')):
+            some = [r for r in rows if (r.pressure > 0.0, surface in r.setting) == (domed, True)]
+            x, y = [r.measured for r in some], [r.modelled for r in some]
+            label = f'{"domes" if domed else "flat"}, {surface}'
+            panel.plot(x, y, mark, color=colour, label=label if some else '_')
+    end = 1.05 * max(panel.get_xlim()[1], panel.get_ylim()[1])
+    panel.plot([0.0, end], [0.0, end], color=PALE, lw=1, zorder=0)
+    panel.set(title='friction', xlim=(0.0, end), ylim=(0.0, end))
+    panel.set(xlabel='measured, N', ylabel='model, N')
 
 
 def _shape(calibration: Calibration, panel: Axes) -> None:
@@ -91,7 +84,7 @@ def _shape(calibration: Calibration, panel: Axes) -> None:
         high = np.where(np.isnan(high), 1.1e3 * float(free.height.max()), high)
         _band(panel, pressure, high, low)
     panel.plot(free.pressure / 1e3, 1e3 * free.height, 'o', color=VERMILION, label='measured')
-    panel.set(xlabel='gauge pressure, kPa', ylabel='height of the free dome, mm')
+    panel.set(title='shape', xlabel='gauge pressure, kPa', ylabel='height of the free dome, mm')
     panel.set(xlim=(0.0, None), ylim=(0.0, None))
 
 
@@ -112,7 +105,7 @@ def _limit(calibration: Calibration, panel: Axes) -> None:
             band = np.hypot(force.high - force.value, rise)
             _band(panel, wide, middle + band, np.maximum(0.0, middle - band))
     panel.plot(pressure / 1e3, limit, 'o', color=VERMILION, label='measured')
-    panel.set(xlabel='gauge pressure, kPa', ylabel='force limit of one pad, N')
+    panel.set(title='force limit', xlabel='gauge pressure, kPa', ylabel='force limit of a pad, N')
     panel.set(ylim=(0.0, 1.6 * float(limit.max())))
 
 

@@ -15,23 +15,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from ros_pad import contact
 from ros_pad.capillary.mesh import hexagonal
 from ros_pad.configuration import Setting, quantity
-from ros_pad.contact import (
-    THESIS_LIQUID,
-    WATER,
-    Film,
-    Foot,
-    Inflated,
-    Material,
-    Meniscus,
-    Pad,
-    Pressed,
-    force_limit,
-    inflate,
-    meniscus,
-    press,
-)
+from ros_pad.contact import Film, Foot, Inflated, Material, Meniscus, Pad, Pressed
 from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, largest_pressure
 from ros_pad.contact.pad import DOME_PRESSURE, Array
 from ros_pad.contact.resistance import DOMED, FOOT_SETTINGS, PAD_SETTINGS, RUBBER_SETTINGS
@@ -40,12 +27,8 @@ from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel
 
 MEASURED = 'measured stiffness'
 """Choice of the material for pads of a measured stiffness, without a material."""
-LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
+LIQUIDS = {'water': contact.WATER, 'thesis': contact.THESIS_LIQUID}
 STATES = ('flat, dry', 'flat, wet', 'dome, dry', 'dome, wet')
-NOTE = (
-    'Friction rests on assumed constants, each of which may be wrong by a factor of two:'
-    ' docs/assumptions.md.'
-)
 _LOADS = 30  # points of the curves
 _TICK, _LONGEST = 1e-3, 5.0  # s, see time_to
 
@@ -252,14 +235,13 @@ def explore(inputs: Inputs) -> Explored:
     criterion = parts('', _criterion, inputs, pad, parts)
     foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)
     parts('pressure', _below_ceiling, inputs, foot)
-    free = parts('pressure', inflate, pad, pressure)
-    around = functools.partial(_pitch, inputs, free, parts)
-    pitch = parts('pads sole_radius radius', around)
+    free = parts('pressure', contact.inflate, pad, pressure)
+    pitch = parts('pads sole_radius radius', lambda: _pitch(inputs, free, parts))
     limits = parts('pressure', _limits, pad, pressure) or {}
     parts('pressure', _within_limit, inputs, foot, limits, parts)
     loads, curves = parts('load', _curves, inputs, foot, limits, parts) or (np.zeros(1), {})
     share = parts('load pads', lambda: inputs['load'] / inputs['pads'])
-    pressed = parts('pressure', press, pad, pressure, share)
+    pressed = parts('pressure', contact.press, pad, pressure, share)
     return Explored(
         inputs=inputs,
         foot=foot,
@@ -348,7 +330,7 @@ def _pitch(inputs: Inputs, free: Inflated | None, parts: _Parts) -> float:
 def _limits(pad: Pad, pressure: float) -> dict[str, float]:
     """Return the force limit of a pad by criterion, N; NaN above a criterion's last pressure."""
     return {
-        each: force_limit(pad, pressure, each)
+        each: contact.force_limit(pad, pressure, each)
         if pressure < largest_pressure(pad, each)
         else math.nan
         for each in criteria(pad)
@@ -373,25 +355,23 @@ def _curves(
     loads = np.append(np.linspace(largest / _LOADS, largest, _LOADS), inputs['load'])
     found = {}
     for state in STATES:
-        needs = 'load roughness' + ' film stand' * ('wet' in state)
-        if 'dome' in state:
-            needs += ' pressure'
-        curve = parts(needs, _capacity, inputs, foot, loads, state)
+        dome, wet = 'dome' in state, 'wet' in state
+        if dome and inputs['pressure'] < DOME_PRESSURE:
+            continue  # the foot is flat
+        needs = 'load roughness' + ' film stand' * wet + ' pressure' * dome
+        curve = parts(needs, _capacity, inputs, foot, loads, inputs['pressure'] * dome, wet)
         if curve is not None:
             found[state] = curve
     return loads, found
 
 
-def _capacity(inputs: Inputs, foot: Foot, loads: Array, state: str) -> Array | None:
+def _capacity(inputs: Inputs, foot: Foot, loads: Array, pressure: float, wet: bool) -> Array:
     """Return the capacity under loads, N."""
-    pressure = inputs['pressure'] if 'dome' in state else 0.0
-    if 'dome' in state and pressure < DOME_PRESSURE:
-        return None  # the foot is flat
     most, rough = foot.dome_load(math.inf, pressure), foot.on_rough(inputs['roughness'])
     films, drained, found = (0.0, 0.0), Film(rough), []
     for load in loads.tolist():
         on_domes = min(load, most)
-        if 'wet' in state:
+        if wet:
             drained.touch_down(inputs['film'])
             films = drained.drain(on_domes, load - on_domes, pressure, inputs['stand'])
         found.append(rough.resistance_of(on_domes, load - on_domes, pressure, *films))
@@ -399,7 +379,7 @@ def _capacity(inputs: Inputs, foot: Foot, loads: Array, state: str) -> Array | N
 
 
 def _ring(inputs: Inputs, pressed: Pressed, parts: _Parts) -> Meniscus:
-    ring = meniscus(pressed, LIQUIDS[inputs['liquid']])
+    ring = contact.meniscus(pressed, LIQUIDS[inputs['liquid']])
     if ring.ring_radius > inputs['radius']:
         parts.note(
             'liquid',

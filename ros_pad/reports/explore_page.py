@@ -1,16 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of ``pad explore``, served to this machine alone.
-
-A change of an input is computed beside the server; changes that come meanwhile are answered
-together, by the last of them. Nothing is loaded from elsewhere.
-"""
+"""The page of ``pad explore``, served to this machine alone; nothing is loaded from elsewhere."""
 
 from __future__ import annotations
 
 import asyncio
 import html
 import math
-from collections.abc import Callable
 from typing import Any
 
 from ros_pad import configuration
@@ -18,35 +13,24 @@ from ros_pad.contact import Foot
 from ros_pad.contact.foot_file import foot_text
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.errors import PadError
-from ros_pad.reports import explore_drawings
-from ros_pad.reports.explore import (
-    FIELDS,
-    LIQUIDS,
-    MEASURED,
-    NOTE,
-    Explored,
-    Field,
-    Inputs,
-    explore,
-    inputs_of,
-    rows,
-)
+from ros_pad.reports import explore, explore_drawings
+from ros_pad.reports.explore import FIELDS, LIQUIDS, MEASURED, Explored, Field, Inputs
 from ros_pad.reports.style import BLUE, VERMILION
 
 HOST = '127.0.0.1'
-PATIENCE = 0.1
-"""Time after which old numbers are shown pale while new ones are computed, s."""
+_NOTE = 'Friction rests on assumed constants, which may be wrong by a factor of two:'
+_NOTE += ' docs/assumptions.md.'
 _GROUPS = {
     'Pads': ('material', 'pads', 'radius', 'stiffness', 'thickness', 'sole_radius', 'criterion'),
     'Air': ('supply', 'pressure', 'bore', 'hose'),
     'Ground': ('load', 'liquid', 'film', 'stand', 'roughness'),
 }
 _CHOICES = {'material': 'Material', 'criterion': 'Criterion of the limit', 'liquid': 'Liquid'}
-_CSS = f"""{explore_drawings.STYLE}
+_CSS = f"""
 body {{ font: 15px/1.45 system-ui, sans-serif; }}
 .nicegui-content {{ padding: 0; display: block; }}
 .explore {{ display: grid; grid-template-columns: 21rem minmax(0, 1fr); gap: 0 1.5rem;
-  max-width: 1500px; margin: 0 auto; padding: 1rem 1.25rem; }}
+  grid-template-rows: auto auto 1fr; max-width: 1500px; margin: 0 auto; padding: 1rem 1.25rem; }}
 .top {{ grid-column: 1 / -1; display: flex; gap: 1rem; align-items: center; }}
 .top > :first-child {{ margin-right: auto; }}
 h1 {{ font-size: 1.35rem; font-weight: 650; line-height: 1.2; margin: 0; }}
@@ -57,14 +41,14 @@ h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0
 .remark {{ font-size: 0.82rem; line-height: 1.3; margin: 0.1rem 0 0.4rem;
   padding-left: 0.5rem; border-left: 3px solid {BLUE}; overflow-wrap: anywhere; }}
 .remark.error {{ border-color: {VERMILION}; font-weight: 600; }}
-.figures, .numbers {{ display: grid; gap: 0.5rem 1.5rem;
-  grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); }}
+.figures, .numbers {{ display: grid; gap: 0.5rem 1.5rem; }}
 .figures {{ grid-template-columns: repeat(auto-fit, minmax(25rem, 1fr)); }}
-dl {{ margin: 0; font-size: 0.86rem; }}
-dl div {{ display: flex; justify-content: space-between; border-bottom: 1px solid #dcdfe4; }}
-dd {{ margin: 0; font-variant-numeric: tabular-nums; }}
+.numbers {{ grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); }}
+.numbers table {{ width: 100%; font-size: 0.86rem; border-collapse: collapse; }}
+td {{ border-bottom: 1px solid #dcdfe4; }} td:last-child {{ text-align: right; }}
 .note {{ font-size: 0.82rem; margin-top: 0.8rem; }}
-.stale {{ opacity: 0.35; }}
+.figures svg {{ width: 100%; height: auto; }}
+.stale {{ opacity: 0.35; transition: opacity 0s 0.1s; }}
 """
 
 
@@ -96,7 +80,7 @@ def serve(foot: Foot, port: int, browser: bool) -> None:
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
     core.sio.eio.cors_allowed_origins = None
     ui.run(
-        lambda: Page(inputs_of(foot)).build(),
+        lambda: Page(explore.inputs_of(foot)).build(),
         host=HOST,
         port=port,
         title=f'{foot.source} · pad explore',
@@ -107,49 +91,6 @@ def serve(foot: Foot, port: int, browser: bool) -> None:
         show_welcome_message=False,
         timeout_graceful_shutdown=1,
     )
-
-
-class Latest:
-    """Computes in a thread, and again if that was asked for meanwhile: once, however often.
-
-    Parameters
-    ----------
-    compute : callable
-        Returns an answer to what is true when it begins; called in a thread.
-    show : callable
-        Called with the answer, in the thread of the event loop.
-    wait : callable
-        Called there with words if an answer takes longer than :data:`PATIENCE`, or fails.
-    """
-
-    def __init__(
-        self,
-        compute: Callable[[], Any],
-        show: Callable[[Any], None],
-        wait: Callable[[str], None],
-    ) -> None:
-        self._compute, self._show, self._wait = compute, show, wait
-        self._asked = False
-        self._task: asyncio.Task[None] | None = None
-
-    def ask(self) -> None:
-        """Ask for an answer to what is true from now on."""
-        self._asked = True
-        if self._task is None or self._task.done():
-            self._task = asyncio.get_running_loop().create_task(self._work())
-
-    async def _work(self) -> None:
-        while self._asked:
-            self._asked = False
-            thread = asyncio.ensure_future(asyncio.to_thread(self._compute))
-            if not (await asyncio.wait({thread}, timeout=PATIENCE))[0]:
-                self._wait('computing …')
-            try:
-                self._show(await thread)
-            except Exception as error:
-                self._wait(f'no answer: {error}')
-                if not self._asked:
-                    raise
 
 
 class Page:
@@ -166,8 +107,9 @@ class Page:
 
         self._ui: Any = ui
         self._inputs = inputs
-        self._latest = Latest(lambda: answer(self._inputs), self._show, self._set_pale)
-        self._answers = 0
+        self._answered: Inputs | None = None
+        self._one = asyncio.Lock()
+        self._count = 0
         self._controls: dict[str, Any] = {}
         self._remarks: dict[str, Any] = {}
 
@@ -198,9 +140,10 @@ class Page:
                 self._figures = ui.html(sanitize=False)
             with ui.element('section').classes('answer').props('aria-label="Numbers"') as numbers:
                 self._numbers = ui.html(sanitize=False)
-                ui.html(f'<p class="note">{NOTE}</p>', sanitize=False)
-        self._pale = both, numbers
-        self._latest.ask()
+                ui.html(f'<p class="note">{_NOTE}</p>', sanitize=False)
+        self._answers = both, numbers
+        # The page waits for no answer: NiceGUI gives up on one that takes long.
+        ui.timer(0.0, self.answer, once=True)
 
     def _number(self, field: Field) -> None:
         """Make a number and its slider, which move one another."""
@@ -214,11 +157,11 @@ class Page:
             box.set_value(float(event.args))
             sliding = False
 
-        def changed(event: Any) -> None:
+        async def changed(event: Any) -> None:
             number = event.value
             if not sliding:
                 place(number)
-            self._change(field.name, _si(field, number))
+            await self.change(field.name, _si(field, number))
 
         def place(number: float | None) -> None:
             # As a property of the element an old value would pull at a slider that moves.
@@ -246,23 +189,38 @@ class Page:
             known if value in known else [*known, value],
             label=_CHOICES[name],
             value=value,
-            on_change=lambda event: self._change(name, event.value),
+            on_change=lambda event: self.change(name, event.value),
         ).props(f'dense outlined options-dense aria-label="{_CHOICES[name]}" name={name}')
 
-    def _change(self, name: str, value: Any) -> None:
+    async def change(self, name: str, value: Any) -> None:
+        """Take a value of an input, and show the answer to it."""
         self._inputs = self._inputs | {name: value}
-        self._latest.ask()
+        await self.answer()
 
-    def _set_pale(self, words: str) -> None:
-        self._status.set_text(words)
-        for each in self._pale:
-            each.classes(add='stale') if words else each.classes(remove='stale')
+    async def answer(self) -> None:
+        """Compute the answer to the present inputs beside the server, and show it.
 
-    def _show(self, answer: tuple[Explored, str, str]) -> None:
-        found, figures, numbers = answer
+        Changes that come meanwhile are answered together, by the last of them.
+        """
+        for each in self._answers:
+            each.classes(add='stale')
+        async with self._one:
+            inputs = self._inputs
+            if inputs is self._answered:
+                return
+            try:
+                self._show(*await asyncio.to_thread(answer, inputs))
+            except Exception as error:
+                self._status.set_text(f'no answer: {error}')
+                raise
+            self._answered = inputs
+            if inputs is self._inputs:
+                for each in self._answers:
+                    each.classes(remove='stale')
+
+    def _show(self, found: Explored, figures: str, numbers: str) -> None:
         # A material has its stiffness from its law.
         self._controls['stiffness'].set_visibility(found.inputs['material'] == MEASURED)
-        self._answers += 1
         self._figures.set_content(f'<div class="figures">{figures}</div>')
         for name, element in self._remarks.items():
             element.set_content(
@@ -273,14 +231,15 @@ class Page:
                     if each.name == name
                 )
             )
+        self._count += 1
         self._numbers.set_content(
-            f'<div class="numbers" data-answer="{self._answers}">{numbers}</div>'
+            f'<div class="numbers" data-answer="{self._count}">{numbers}</div>'
         )
-        self._set_pale('')
+        self._status.set_text('')
 
     async def _export(self) -> None:
         """Download the foot of the present inputs."""
-        foot = (await asyncio.to_thread(explore, self._inputs)).foot
+        foot = (await asyncio.to_thread(explore.explore, self._inputs)).foot
         if foot is None:
             self._ui.notify('There is no foot: mend what is marked at the inputs', type='warning')
             return
@@ -309,12 +268,12 @@ def foot_file(foot: Foot) -> str:
 
 def answer(inputs: Inputs) -> tuple[Explored, str, str]:
     """Return the answer to the inputs, its drawings and its numbers, as HTML."""
-    found = explore(inputs)
+    found = explore.explore(inputs)
     numbers = ''
-    for title, group in rows(found).items():
+    for title, group in explore.rows(found).items():
         lines = ''.join(
-            f'<div><dt>{html.escape(label)}</dt><dd id="{key}">{html.escape(text)}</dd></div>'
+            f'<tr><td>{html.escape(label)}</td><td id="{key}">{html.escape(text)}</td></tr>'
             for key, (label, text) in group.items()
         )
-        numbers += f'<div><h2>{title}</h2><dl>{lines}</dl></div>'
+        numbers += f'<div><h2>{title}</h2><table>{lines}</table></div>'
     return found, explore_drawings.drawings(found), numbers

@@ -34,9 +34,7 @@ def save(path: str | os.PathLike[str], data: bytes, new_folder: bool = True) -> 
         raise PadError(f'{path}: cannot be written: {error.strerror}') from error
 
 
-def write_picture(
-    path: str | os.PathLike[str], draw: Callable[[], Figure], dpi: float = 200.0
-) -> None:
+def write_picture(path: str | os.PathLike[str], draw: Callable[[], Figure]) -> None:
     """Draw a figure in :data:`PAPER_STYLE` and write it; an existing file is replaced.
 
     Parameters
@@ -44,9 +42,7 @@ def write_picture(
     path : path
         Ends in .png, .svg or .pdf.
     draw : callable
-        Returns the figure.
-    dpi : float
-        Resolution of a PNG, dots per inch.
+        Returns the figure; a PNG has 200 dots per inch of it.
 
     Raises
     ------
@@ -55,11 +51,10 @@ def write_picture(
     PadError
         When the file cannot be written.
     """
-    ending = choice(
-        f'ending of {os.fspath(path)}', pathlib.Path(path).suffix, ('.png', '.svg', '.pdf')
-    )
+    path = pathlib.Path(path)
+    ending = choice(f'ending of {path}', path.suffix, ('.png', '.svg', '.pdf'))
     with matplotlib.rc_context(PAPER_STYLE):
-        save(path, rendered(draw(), ending[1:], dpi=dpi), new_folder=False)
+        save(path, rendered(draw(), ending[1:], dpi=200), new_folder=False)
 
 
 def write_figures(

@@ -14,20 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.reports.style import (
-    BLACK,
-    BLUE,
-    COLUMN,
-    GREEN,
-    PALE,
-    PAPER_STYLE,
-    STANCE,
-    VERMILION,
-    WET,
-    WIDE,
-    Drawn,
-    legend,
-)
+from ros_pad.reports import style
+from ros_pad.reports.style import BLACK, BLUE, PALE, STANCE, VERMILION, WET, Drawn
 from ros_pad.reports.view import View, spans, window_of
 
 POLICY_NAMES = {
@@ -41,10 +29,10 @@ POLICY_NAMES = {
 def draw(view: View) -> dict[str, Drawn]:
     """Draw the figures for which a trial has the data; return them by name, in report order.
 
-    The caller must save them under ``matplotlib.rc_context(PAPER_STYLE)``, which sets the fonts.
+    The caller must save them under ``rc_context(PAPER_STYLE)``, which sets the fonts.
     """
     found = {}
-    with matplotlib.rc_context(PAPER_STYLE):
+    with matplotlib.rc_context(style.PAPER_STYLE):
         if len(view.rows) > 1:
             found['comparison'] = _comparison(view)
         if len(view.trial.slow_time) > 1:
@@ -57,37 +45,26 @@ def draw_comparison(ax: Axes, view: View, size: float) -> None:
     """Draw the distance per gait cycle of each policy as bars; ``size`` is that of the text."""
     rows = view.rows
     values = [1e3 * row['distance_per_cycle_m'] for row in rows]
-    own = [row['policy'] == view.trial.policy for row in rows]
+    colours = [BLUE if row['policy'] == view.trial.policy else '#A9B4BC' for row in rows]
     places = np.arange(len(rows))[::-1]
-    ax.barh(places, values, color=[BLUE if mine else '#A9B4BC' for mine in own], height=0.68)
+    bars = ax.barh(places, values, color=colours, height=0.68)
+    look: dict[str, Any] = {'fontsize': size, 'bbox': {'color': 'white', 'pad': 0.5}}
+    ax.bar_label(bars, [f'{value:.0f}' for value in values], padding=4.0, **look)
     names = POLICY_NAMES | {'oracle': 'oracle\n(sees ahead)'}
     ax.set_yticks(places, [names.get(row['policy'], row['policy']) for row in rows])
     ax.tick_params(axis='y', length=0)
     stride = 1e3 * view.trial.settings.get('stride_m', 0.0)
-    reach = max([*values, stride, 1.0])
-    for place, value, mine in zip(places, values, own, strict=True):
-        inside = value > 0.15 * reach
-        ax.text(
-            max(value, 0.0),
-            place,
-            f'{value:.0f} ' if inside else f' {value:.0f}',
-            color='white' if mine and inside else BLACK,
-            ha='right' if inside else 'left',
-            va='center',
-            fontsize=size,
-            fontweight='bold' if mine else 'normal',
-        )
     if stride:
         ax.axvline(stride, color=BLACK, linestyle='--', linewidth=1.0)
         words = f'no slip: {stride:.0f} '
         ax.text(stride, len(rows) - 0.5, words, ha='right', va='bottom', fontsize=0.9 * size)
-    ax.set_xlim(min(0.0, *values), 1.04 * reach)
+    ax.set_xlim(min(0.0, *values), 1.12 * max([*values, stride, 1.0]))
     ax.set_ylim(-0.5, len(rows) - 0.05)
     ax.set_xlabel('advance per gait cycle / mm')
 
 
 def _comparison(view: View) -> Drawn:
-    figure = Figure(figsize=(COLUMN, 0.32 * len(view.rows) + 0.6), layout='constrained')
+    figure = Figure(figsize=(style.COLUMN, 0.32 * len(view.rows) + 0.6), layout='constrained')
     draw_comparison(figure.subplots(), view, size=8.0)
     bars = ', '.join(
         f'{POLICY_NAMES.get(row["policy"], row["policy"])} '
@@ -105,7 +82,7 @@ def _comparison(view: View) -> Drawn:
 def _overview(view: View, window: tuple[float, float]) -> Drawn:
     """Draw estimate, truth, morphology and alarms of each leg over the whole trial."""
     trial = view.trial
-    figure = Figure(figsize=(WIDE, 0.55 * len(view.order) + 0.9), layout='constrained')
+    figure = Figure(figsize=(style.WIDE, 0.55 * len(view.order) + 0.9), layout='constrained')
     axes = figure.subplots(len(view.order), 1, sharex=True, squeeze=False)[:, 0]
     for ax, column in zip(axes, view.order, strict=True):
         if view.wet is not None:
@@ -132,7 +109,7 @@ def _overview(view: View, window: tuple[float, float]) -> Drawn:
         Line2D([], [], linestyle='', marker='|', color=BLACK, markersize=6, label='slip alarm'),
         Patch(facecolor='none', edgecolor=PALE, linestyle=':', label='enlarged below'),
     ]
-    legend(figure, handles, columns=5)
+    style.legend(figure, handles, columns=5)
     return Drawn(
         figure,
         'The whole trial, leg by leg',
@@ -149,7 +126,7 @@ def _window(view: View, window: tuple[float, float]) -> Drawn:
     fast = (trial.time >= window[0]) & (trial.time <= window[1])
     slow = (trial.slow_time >= window[0]) & (trial.slow_time <= window[1])
     time = trial.slow_time[slow]
-    figure = Figure(figsize=(WIDE, 0.72 * len(view.order) + 0.9), layout='constrained')
+    figure = Figure(figsize=(style.WIDE, 0.72 * len(view.order) + 0.9), layout='constrained')
     axes = figure.subplots(len(view.order), 4, sharex=True, sharey='col', squeeze=False)
     titles = ('normal force / N', 'gauge pressure / kPa', 'P(wet)', 'slip speed / (mm/s)')
     for ax, title in zip(axes[0], titles, strict=True):
@@ -163,7 +140,7 @@ def _window(view: View, window: tuple[float, float]) -> Drawn:
         pressure.step(time, 1e-3 * wanted, where='post', color=BLACK, linewidth=0.8, ls='--')
         wetness.step(time, trial.wet_probability[slow, column], where='post', color=BLUE, lw=1.1)
         speed = 1e3 * trial.slip_speed[slow, column]
-        slip.plot(time, speed, color=GREEN, linewidth=0.9)
+        slip.plot(time, speed, color=style.GREEN, linewidth=0.9)
         alarm = trial.slipping[slow, column]
         slip.plot(time[alarm], speed[alarm], '.', color=VERMILION, markersize=2.5)
         force.set_ylabel(f'leg {trial.legs[column]}', fontweight='bold')
@@ -181,17 +158,17 @@ def _window(view: View, window: tuple[float, float]) -> Drawn:
     handles += [
         Line2D([], [], color=BLUE, label='measured, estimated'),
         Line2D([], [], color=BLACK, linestyle='--', label='set-point'),
-        Line2D([], [], color=GREEN, label='slip'),
+        Line2D([], [], color=style.GREEN, label='slip'),
         Line2D([], [], linestyle='', marker='.', color=VERMILION, markersize=5, label='alarm'),
     ]
-    legend(figure, handles, columns=6)
+    style.legend(figure, handles, columns=6)
     figure.align_ylabels(axes[:, 0])
     return Drawn(
         figure,
         f'From {window[0]:.0f} s to {window[1]:.0f} s',
         'For each leg: normal force, pressure with set-point, probability of wet ground, and slip '
         'speed, with stances shaded',
-        'The part of the trial in which most feet came onto wet ground or became domes.',
+        'The part around the middle of all steps onto wet ground and of all changes to domes.',
     )
 
 

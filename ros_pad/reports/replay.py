@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import VERMILION, WIDE
+from ros_pad.reports.style import VERMILION, WIDE, legend
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.replay import Replay
 
@@ -20,25 +18,8 @@ RECORDED: dict[str, Any] = {'color': '#C4C4C4', 'lw': 3.0, 'solid_capstyle': 'bu
 REPLAYED: dict[str, Any] = {'color': VERMILION, 'lw': 1.0}
 
 
-def draw(path: str | os.PathLike[str], replay: Replay) -> None:
-    """Draw P(wet) and set-points, recorded and replayed, with one row for each leg.
-
-    Parameters
-    ----------
-    path : path
-        Ends in .png, .svg or .pdf. An existing file is replaced.
-    replay : Replay
-        The replay to draw.
-
-    Raises
-    ------
-    InvalidInput
-        When the path has another ending.
-    """
-    write_picture(path, lambda: _figure(replay))
-
-
-def _figure(replay: Replay) -> Figure:
+def draw(replay: Replay) -> Figure:
+    """Draw P(wet) and set-points, recorded and replayed, with one row for each leg."""
     figure = Figure(figsize=(WIDE, 0.9 + 0.95 * len(replay.legs)), layout='constrained')
     grid = figure.subplots(len(replay.legs), 2, sharex=True, sharey='col', squeeze=False)
     for (wet, pressure), leg in zip(grid, replay.legs, strict=True):
@@ -59,7 +40,7 @@ def _figure(replay: Replay) -> Figure:
         Line2D([], [], label='recorded' if anything else 'recorded (none)', **RECORDED),
         Line2D([], [], label='replayed', **REPLAYED),
     ]
-    figure.legend(handles=lines, loc='outside upper right', ncols=2)
+    legend(figure, lines)
     return figure
 
 

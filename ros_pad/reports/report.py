@@ -6,6 +6,7 @@ from __future__ import annotations
 import html
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -89,10 +90,6 @@ def _result(view: View) -> str:
             gain = 100.0 * (own.distance_per_cycle_m / advance - 1.0)
             text += f'; {gain:+z.0f} % against {_name(row["policy"])} ({1e3 * advance:.0f} mm)'
     text += '.'
-    if own.time_to_goal_s is not None:
-        text += f' It reached the goal of {own.goal_m:g} m after {own.time_to_goal_s:.1f} s.'
-    elif own.goal_m is not None:
-        text += f' It did not reach the goal of {own.goal_m:g} m.'
     if own.verdict:
         text += f' The walk is not valid: {own.verdict}.'
     return text
@@ -109,17 +106,16 @@ def unobservable_shares(trial: Trial, load_gate: float) -> str:
         trial.doubt[np.maximum(rows - 1, 0), column]
         for column, rows in enumerate(stance_ends(trial, load_gate))
     ]
-    places, counts = np.unique(np.concatenate(ends), return_counts=True)
-    stances = dict(zip(places.tolist(), counts.tolist(), strict=True))
-    total = sum(stances.values())
-    if not total or set(stances) == {-1}:
+    stances = Counter(np.concatenate(ends).tolist())
+    if set(stances) <= {-1}:
         return ''
-    others = sorted(((count, place) for place, count in stances.items() if place), reverse=True)
+    total = stances.total()
+    text = f'At the end of {stances[0]} of {total} stances the ground was observable.'
     why = ', '.join(
         f'{DOUBTS[place] if place > 0 else "not on record"} {100.0 * count / total:.0f} %'
-        for count, place in others
+        for place, count in stances.most_common()
+        if place
     )
-    text = f'At the end of {stances.get(0, 0)} of {total} stances the ground was observable.'
     return text + (f' Reasons at the other ends: {why}.' if why else '')
 
 
@@ -153,30 +149,21 @@ def _terms_table(settings: Mapping[str, Any]) -> str:
     terms = [*settings.get('omitted', ()), *settings.get('taken', ())]
     if not terms:
         return '<p>No simulation is on record for this trial.</p>'
-    rows = [
-        [
-            html.escape(str(each['term'])),
-            'yes' if each.get('taken') else 'no',
-            *_bound_and_effect(each),
-            html.escape(str(each['reason'])),
-        ]
-        for each in terms
-    ]
+    rows = []
+    for each in terms:
+        often = ' in 95 of 100 scenes' if each.get('kind') == 'promise' else ''
+        bound = each['bound']
+        most = 'not known' if bound is None else f'≤ {100.0 * bound:.1f} %{often}'
+        effect, share = each.get('effect'), 'not known'
+        if effect is not None:
+            share = f'≈ {100.0 * effect:.1f} %' if effect <= 1.0 else 'all of it'
+        if each.get('exceeds'):
+            share += ', exceeds the accuracy required'
+        taken = 'yes' if each.get('taken') else 'no'
+        cells = (str(each['term']), taken, most, share, str(each['reason']))
+        rows.append([html.escape(cell) for cell in cells])
     head = ['term', 'modelled', 'bound', 'effect on the result', 'quantity, and source']
     return table(head, rows, range(2, 4))
-
-
-def _bound_and_effect(term: dict[str, Any]) -> tuple[str, str]:
-    """Return bound and effect of a term in words, with how often and whether it is too large."""
-    bound, effect = term['bound'], term.get('effect')
-    often = ' in 95 of 100 scenes' if term.get('kind') == 'promise' else ''
-    note = ', exceeds the accuracy required' if term.get('exceeds') else ''
-    if effect is not None:
-        note = (f'≈ {100.0 * effect:.1f} %' if effect <= 1.0 else 'all of it') + note
-    return (
-        'not known' if bound is None else f'≤ {100.0 * bound:.1f} %{often}',
-        note or 'not known',
-    )
 
 
 def _facts(trial: Trial) -> list[str]:

@@ -34,6 +34,7 @@ PAPER_STYLE: dict[Any, Any] = STYLE | {
     'font.size': 8.0,
     'axes.titlesize': 8.0,
     'legend.fontsize': 8.0,
+    'legend.title_fontsize': 8.0,
     'legend.handlelength': 1.8,
     'legend.columnspacing': 1.2,
     'axes.linewidth': 0.7,
@@ -78,12 +79,22 @@ def rendered(figure: Figure, kind: str, **options: Any) -> bytes:
     return stream.getvalue()
 
 
-def legend(figure: Figure, handles: Sequence[Any], columns: int | None = None) -> None:
+def policy_look(policy: str) -> tuple[str, str]:
+    """Return colour and marker of a policy in figures that compare several."""
+    looks = {'adaptive': (GREEN, 'o'), 'flat': (VERMILION, 's'), 'dome': (BLUE, '^')}
+    return looks.get(policy, (BLACK, 'D'))
+
+
+def legend(
+    figure: Figure, handles: Sequence[Any], columns: int | None = None, title: str = ''
+) -> None:
     """Add a legend above all axes, where it hides no data, in one row or in ``columns``."""
     columns = columns or len(handles)
-    figure.legend(handles=handles, loc='upper left', ncols=columns)
+    figure.legend(
+        handles=handles, loc='upper left', ncols=columns, title=title or None, alignment='left'
+    )
     layout = figure.get_layout_engine()
     assert isinstance(layout, ConstrainedLayoutEngine)
     # In inches, because matplotlib before 3.7 cannot place a legend outside by itself.
-    lines = -(-len(handles) // columns)
+    lines = -(-len(handles) // columns) + bool(title)
     layout.set(rect=(0.0, 0.0, 1.0, 1.0 - (0.14 + 0.18 * lines) / figure.get_figheight()))

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -20,25 +19,9 @@ from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import save
 from ros_pad.reports.page import heading, page, plain_table, section, table, warning
-from ros_pad.reports.style import (
-    BLACK,
-    BLUE,
-    COLUMN,
-    GREEN,
-    PALE,
-    PAPER_STYLE,
-    VERMILION,
-    WIDE,
-    Drawn,
-)
+from ros_pad.reports.style import COLUMN, PALE, PAPER_STYLE, WIDE, Drawn, legend, policy_look
 from ros_pad.trials.sweep import Found, Point, Row, points
 
-LOOKS = {
-    'adaptive': (GREEN, 'o'),
-    'flat': (VERMILION, 's'),
-    'dome': (BLUE, '^'),
-    'oracle': (BLACK, 'D'),
-}
 PANELS = 48  # largest number of panels of the figure
 MOST_ROWS = 1000  # largest number of rows of the table of conditions
 MOST_FAILURES = 50  # largest number of failed or ended trials in a table
@@ -112,7 +95,7 @@ def _panel(axes: Axes, shown: Sequence[Point], axis: str, values: Sequence[Any])
     reach = (last - first) or 1.0
     policies = list(dict.fromkeys(point.labels['policy'] for point in shown))
     for number, policy in enumerate(policies):
-        colour, mark = LOOKS[policy]
+        colour, mark = policy_look(policy)
         # Shift the policies sideways, so that no interval hides another.
         aside = (0.06 if words else 0.012) * reach * (number - 0.5 * (len(policies) - 1))
         line = []
@@ -146,18 +129,16 @@ def _panel(axes: Axes, shown: Sequence[Point], axis: str, values: Sequence[Any])
 
 
 def _legend(figure: Figure, shown: Sequence[Point], columns: int) -> None:
-    lines = [
-        Line2D([], [], color=LOOKS[each][0], marker=LOOKS[each][1], ms=4.5, lw=1.4, label=each)
-        for each in dict.fromkeys(point.labels['policy'] for point in shown)
-    ]
+    lines = []
+    for policy in dict.fromkeys(point.labels['policy'] for point in shown):
+        colour, mark = policy_look(policy)
+        lines.append(Line2D([], [], color=colour, marker=mark, ms=4.5, lw=1.4, label=policy))
     if any(point.left_out for point in shown):
         look: dict[str, Any] = {'color': PALE, 'marker': 'o', 'mfc': 'white', 'lw': 0}
         lines.append(Line2D([], [], label='some walks left out', **look))
     seeds = sorted({point.walks + point.left_out for point in shown})
     most = f' to {seeds[-1]}' if seeds[1:] else ''
-    title = f'mean and 95 % interval over {seeds[0]}{most} seeds'
-    look = {'title': title, 'title_fontsize': 8, 'alignment': 'left'}
-    figure.legend(handles=lines, loc='outside upper left', ncols=columns, **look)
+    legend(figure, lines, columns, f'mean and 95 % interval over {seeds[0]}{most} seeds')
 
 
 def write(found: Found, path: str | os.PathLike[str], force: bool = False) -> None:
@@ -188,28 +169,25 @@ def write(found: Found, path: str | os.PathLike[str], force: bool = False) -> No
         f'seeds {_seeds(sweep.seeds)}',
         f'ros_pad {found.about["version"]}',
     ]
-    parts = [heading(f'Sweep {name}', facts)]
-    left_out = {
-        'trials failed': [(row['error'], row) for row in rows if row['error']],
-        'walks ended early': [
-            (row['verdict'], row) for row in rows if row['verdict'] and not row['error']
-        ],
-    }
-    for words, some in left_out.items():
-        if some:
-            parts.append(
-                warning(f'{len(some)} of {len(rows)} {words}, and are in no mean or median.')
-            )
+    failed = [(row['error'], row) for row in rows if row['error']]
+    ended = [(row['verdict'], row) for row in rows if row['verdict'] and not row['error']]
+    left_out = {'trials failed': failed, 'walks ended early': ended}
+    warnings = [
+        f'{len(some)} of {len(rows)} {words}, and are in no mean.'
+        for words, some in left_out.items()
+        if some
+    ]
     for scene in sweep.scenes:
         levels = sorted({row['level'] for row in rows if row['scene'] == scene})
         if len(levels) > 1:
             words = f'{scene} was walked on {" and ".join(levels)}'
-            parts.append(warning(f'{words}: a difference may come from that.'))
+            warnings.append(f'{words}: a difference may come from that.')
     try:
         with matplotlib.rc_context(PAPER_STYLE):
-            parts.append(section(drawn(found)))
+            figure = section(drawn(found))
     except InvalidInput:
-        parts.append('<p>A figure would have too many panels: the table has all numbers.</p>')
+        figure = '<p>A figure would have too many panels: the table has all numbers.</p>'
+    parts = [heading(f'Sweep {name}', facts), *map(warning, warnings), figure]
     parts.append('<h2>Condition by condition</h2>' + _conditions_table(found))
     for words, some in left_out.items():
         if some:
@@ -219,53 +197,24 @@ def write(found: Found, path: str | os.PathLike[str], force: bool = False) -> No
 
 
 def _conditions_table(found: Found) -> str:
-    sweep = found.sweep
     # Parameters with only one value are below the table, not in it.
-    values = {'scene': sweep.scenes, **sweep.parameters}
-    names = [name for name, each in values.items() if len(each) > 1]
-    shown = points(found.rows, sweep.parameters)
+    values = {'scene': found.sweep.scenes, **found.sweep.parameters}
+    names = [*(name for name, each in values.items() if len(each) > 1), 'policy']
+    shown = points(found.rows, found.sweep.parameters)
     body = []
     for point in shown[:MOST_ROWS]:
-        own = [
-            row
-            for row in found.rows
-            if not row['error']
-            and not row['verdict']
-            and all(row[name] == value for name, value in point.labels.items())
-        ]
-        slips = [1e3 * np.mean(_of_legs(row, 'slip_path_m')) / row['cycles_walked'] for row in own]
-        switches = [sum(_of_legs(row, 'switches')) for row in own]
-        right = [1e2 * row['wet_accuracy'] for row in own if row.get('wet_accuracy') is not None]
         ends = [f'{1e3 * end:.1f}' for end in (point.low, point.high) if end is not None]
-        body.append(
-            [
-                *(html.escape(_cell(point.labels[name])) for name in (*names, 'policy')),
-                *(str(point.walks), str(point.left_out)),
-                *('–' if point.mean is None else f'{1e3 * point.mean:.1f}', ' to '.join(ends)),
-                *(f'{np.median(each):.1f}' if each else '–' for each in (slips, switches, right)),
-            ]
-        )
-    head = [
-        *(html.escape(name) for name in (*names, 'policy')),
-        *('walks', 'left out', 'mean / mm', '95 % interval'),
-        *('slip / mm', 'switches', 'wetness accuracy / %'),
-    ]
-    text = table(head, body, range(len(names) + 1, len(head)))
-    text += (
-        "<p class='note'>The mean is of the advance per gait cycle, its interval by Student's t."
-        ' The last three columns are medians over walks: slip is the slip path of a foot in a gait'
-        ' cycle, mean of the feet; switches are all morphology changes of a walk; wetness accuracy'
-        ' is the share of flat stances at whose end P(wet) was on the correct side of 0.5.</p>'
-    )
-    if len(shown) > MOST_ROWS:
-        text += f'<p>{len(shown) - MOST_ROWS} more conditions are in trials.csv.</p>'
-    return text
+        mean = '–' if point.mean is None else f'{1e3 * point.mean:.1f}'
+        cells = [html.escape(_cell(point.labels[name])) for name in names]
+        body.append([*cells, str(point.walks), str(point.left_out), mean, ' to '.join(ends)])
+    head = [*map(html.escape, names), 'walks', 'left out', 'mean / mm', '95 % interval']
+    text = table(head, body, range(len(names), len(head)))
+    text += '<p class="note">Advance per gait cycle; its interval is by Student\'s t.</p>'
+    return text + _more(len(shown) - MOST_ROWS, 'conditions')
 
 
-def _of_legs(row: Row, name: str) -> list[float]:
-    return [
-        each for key, each in row.items() if key.startswith(f'{name}_leg') and each is not None
-    ]
+def _more(count: int, what: str) -> str:
+    return f'<p>{count} more {what} are in trials.csv.</p>' if count > 0 else ''
 
 
 def _failures(found: Found, rows: Sequence[tuple[str, Row]]) -> str:
@@ -282,9 +231,7 @@ def _failures(found: Found, rows: Sequence[tuple[str, Row]]) -> str:
     # Reasons are long: unlike in other tables, let the first column wrap.
     text = table(['why', 'command to repeat it'], body, range(0))
     text = text.replace('<td>', '<td style="white-space: normal">')
-    if len(rows) > MOST_FAILURES:
-        text += f'<p>{len(rows) - MOST_FAILURES} more are in trials.csv.</p>'
-    return text
+    return text + _more(len(rows) - MOST_FAILURES, 'trials')
 
 
 def _swept(found: Found) -> str:

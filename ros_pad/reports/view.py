@@ -82,28 +82,16 @@ def spans(time: np.ndarray, mask: np.ndarray) -> list[tuple[float, float]]:
 
 
 def window_of(view: View) -> tuple[float, float]:
-    """Return start and end, s, of the part of a trial that shows most changes.
+    """Return start and end, s, of the part of a trial around the middle of its changes.
 
-    It lasts :data:`WINDOW` at most. In it the largest number of feet come onto wet ground or
-    become domes.
+    It lasts :data:`WINDOW` at most. A change is a foot that comes onto wet ground or becomes a
+    dome.
     """
     trial = view.trial
-    if not len(trial.slow_time):
-        return (0.0, WINDOW)
     first, last = float(trial.slow_time[0]), float(trial.slow_time[-1])
-    if last - first <= WINDOW:
-        return (first, last)
     changed = [trial.dome] if view.wet is None else [trial.dome, view.wet]
-    changes = np.concatenate([~each[:-1] & each[1:] for each in changed], axis=1)
-    times = trial.slow_time[1:]
-
-    def inside(start: float) -> np.ndarray:
-        return (times >= start) & (times < start + WINDOW)
-
-    starts = np.arange(first, last - WINDOW + 0.25, 0.5)
-    best = max(starts, key=lambda start: np.count_nonzero(changes[inside(start)].any(axis=0)))
-    # Then centre the window on the changes.
-    moments = times[inside(best) & changes.any(axis=1)]
-    middle = float(moments.mean()) if len(moments) else best + 0.5 * WINDOW
-    start = min(max(first, middle - 0.5 * WINDOW), last - WINDOW)
-    return (start, start + WINDOW)
+    changes = np.concatenate([~each[:-1] & each[1:] for each in changed], axis=1).any(axis=1)
+    moments = trial.slow_time[1:][changes]
+    middle = float(np.median(moments)) if len(moments) else 0.5 * (first + last)
+    start = max(first, min(middle - 0.5 * WINDOW, last - WINDOW))
+    return start, min(start + WINDOW, last)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +19,6 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from ros_pad.capillary import Mesh, Wet, WetPattern, WetSurface
 from ros_pad.capillary.sections import layered, walls
-from ros_pad.reports.files import write_picture
 from ros_pad.reports.style import BLACK, BLUE, WET
 
 Array = npt.NDArray[Any]
@@ -113,20 +111,12 @@ def _disc(mesh: Mesh, found: WetPattern, level: float) -> Array:
     """Return the level surface of the liquid between pads, drawn as a disc."""
     if not math.isfinite(level):
         return np.empty((0, 4, 3))
-    middle = 500.0 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
-    radius = max(
-        1e3 * math.sqrt(found.area / math.pi),
-        1e3 * float(np.hypot(*(mesh.points[:, :2] - 1e-3 * middle[:2]).T).max()),
-    )
-    turns, radii = np.linspace(0.0, 2.0 * math.pi, 73), np.linspace(0.0, radius, 25)
-    grid = np.stack(
-        [
-            middle[0] + radii[:, None] * np.cos(turns),
-            middle[1] + radii[:, None] * np.sin(turns),
-            np.full((25, 73), level),
-        ],
-        axis=2,
-    )
+    middle = 500.0 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))[:2]
+    reach = 1e3 * float(np.hypot(*(mesh.points[:, :2] - 1e-3 * middle).T).max())
+    radii = np.linspace(0.0, max(1e3 * math.sqrt(found.area / math.pi), reach), 25)[:, None]
+    turns = np.linspace(0.0, 2.0 * math.pi, 73)
+    x, y = middle[0] + radii * np.cos(turns), middle[1] + radii * np.sin(turns)
+    grid = np.stack([x, y, np.full(x.shape, level)], axis=2)
     return _quads(grid)
 
 
@@ -136,34 +126,11 @@ def _quads(grid: Array) -> Array:
     return np.stack(corners, axis=2).reshape(-1, 4, 3)
 
 
-def draw(
-    path: str | os.PathLike[str],
-    mesh: Mesh,
-    found: Wet | WetPattern | WetSurface,
-    direction: float = 0.0,
-) -> None:
+def draw(mesh: Mesh, found: Wet | WetPattern | WetSurface, direction: float = 0.0) -> Figure:
     """Draw the wetted mesh beside a section (single pad) or the free area by height (pattern).
 
-    Parameters
-    ----------
-    path : path
-        Ends in .png, .svg or .pdf. An existing file is replaced.
-    mesh : Mesh
-        The wetted mesh.
-    found : Wet, WetPattern or WetSurface
-        The solution for it.
-    direction : float
-        Azimuth of the section, rad; not used for a pattern.
-
-    Raises
-    ------
-    InvalidInput
-        When the path has another ending.
+    ``direction`` is the azimuth of the section, rad.
     """
-    write_picture(path, lambda: _figure(mesh, found, direction), dpi=300)
-
-
-def _figure(mesh: Mesh, found: Wet | WetPattern | WetSurface, direction: float) -> Figure:
     figure = Figure(figsize=(7.0, 2.7 if isinstance(found, WetPattern) else 2.2))
     body: Any = figure.add_axes((-0.12, -0.25, 0.80, 1.45), projection='3d', computed_zorder=False)
     plane = figure.add_axes((0.645, 0.17, 0.33, 0.70))

@@ -474,7 +474,7 @@ def _from_table(table: Table, path: pathlib.Path) -> Robot:
 
 def _of_file(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot:
     """Return the robot of the URDF file that a YAML file names."""
-    feet = table.texts('feet')
+    feet = table.sequence('feet')
     with table.table('home', default={}) as part:
         others['home'] = {key: part.number(key, 'rad or m') for key in part.keys}
     file = path.parent / table.text('urdf')

@@ -40,7 +40,7 @@ def behaviour(case: str, cycles: int | None) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         words += ['--json', '--out', str(pathlib.Path(folder) / 'out')]
         found = subprocess.run(
-            [sys.executable, '-m', 'ros_pad.cli', *words],
+            [sys.executable, '-m', 'ros_pad', *words],
             capture_output=True, text=True, cwd=command.ROOT,
         )  # fmt: skip
     if found.returncode not in (0, 1) or not found.stdout:

@@ -10,11 +10,10 @@ from __future__ import annotations
 import json
 import pathlib
 from collections.abc import Sequence
-from contextlib import suppress
 
 import matplotlib
 
-from ros_pad.commands.folder import new_folder
+from ros_pad.commands.folder import kept_if_filled, new_folder
 from ros_pad.contact import Foot
 from ros_pad.reports.files import save
 from ros_pad.reports.style import PAPER_STYLE, rendered
@@ -46,17 +45,13 @@ def main(words: Sequence[str]) -> int:
     trial = bench.run(scene)
     folder = new_folder(options.out, scene.name)
     report, files = folder / 'report.html', []
-    try:
-        with matplotlib.rc_context(PAPER_STYLE):
-            drawn = bench_figures.draw(trial)
-            for number, each in drawn.items():
-                for kind in ('png', 'pdf'):
-                    files.append(folder / f'figure_{number}.{kind}')
-                    save(files[-1], rendered(each.figure, kind, dpi=DPI))
+    with kept_if_filled(folder), matplotlib.rc_context(PAPER_STYLE):
+        drawn = bench_figures.draw(trial)
+        for number, each in drawn.items():
+            for kind in ('png', 'pdf'):
+                files.append(folder / f'figure_{number}.{kind}')
+                save(files[-1], rendered(each.figure, kind, dpi=DPI))
         page.write_bench(trial, drawn, report)
-    finally:
-        with suppress(OSError):  # remove an empty folder, so that the name can be used again
-            folder.rmdir()
     summary = trial.as_dict() | {'report': str(report), 'figures': [str(file) for file in files]}
     text = json.dumps(summary, indent=1, allow_nan=False)
     save(folder / 'summary.json', (text + '\n').encode())

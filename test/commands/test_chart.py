@@ -63,7 +63,7 @@ def test_a_bench_scene_runs_in_a_checkout(tmp_path):
     out = tmp_path / 'out'
     words = ['run', 'bench_inflation', '--json', '--out', str(out)]
     found = subprocess.run(
-        [sys.executable, '-m', 'ros_pad.cli', *words], capture_output=True, text=True, cwd=tmp_path
+        [sys.executable, '-m', 'ros_pad', *words], capture_output=True, text=True, cwd=tmp_path
     )
     assert found.returncode == 0, found.stderr
     assert json.loads(found.stdout)['scene'] == 'bench_inflation'
@@ -75,7 +75,7 @@ def test_without_a_checkout_it_is_written_where_studies_are(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / 'ros_pad', ignore=shutil.ignore_patterns('__pycache__'))
     shutil.copytree(PACKAGE.parent / 'config', tmp_path / 'config')
     found = subprocess.run(
-        [sys.executable, '-m', 'ros_pad.cli', 'chart', 'contact'],
+        [sys.executable, '-m', 'ros_pad', 'chart', 'contact'],
         capture_output=True,
         text=True,
         cwd=tmp_path,

@@ -22,7 +22,7 @@ def emulate() -> Iterator:
     started = []
 
     def start(*arguments: str) -> tuple[subprocess.Popen, str]:
-        command = [sys.executable, '-m', 'ros_pad.cli', 'emulate', *arguments]
+        command = [sys.executable, '-m', 'ros_pad', 'emulate', *arguments]
         child = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

@@ -99,7 +99,7 @@ def test_the_replayed_bag_is_a_bag_for_others(tmp_path):
         (['--set', 'policy.dwell=3', '--policy', 'dome'], 'only the adaptive'),
         (['--remap', 'leg_1/wrench:=/x'], "'/x' is not allowed"),
         (['--namespace', 'spider'], 'in namespace /spider/ is needed'),
-        (['--figure', 'picture.jpg'], 'picture.jpg'),
+        (['--figure', 'picture.jpg'], "'.jpg' is not allowed"),
     ],
 )
 def test_bad_input_is_status_2(arguments, said, tmp_path, capsys, monkeypatch):

@@ -14,9 +14,9 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from ros_pad import cli
-from ros_pad.commands.command import INTERRUPTED
 from ros_pad.contact import Foot
 from ros_pad.reports import explore_page
+from ros_pad.signals import INTERRUPTED
 from studies.work_precision import explore as study
 
 pytest.importorskip('nicegui', reason="the extra is missing: pip install 'ros_pad[explore]'")
@@ -78,7 +78,7 @@ def test_a_slider_moves_the_numbers_to_those_of_pad_contact(page, capsys):
     }.items():
         assert shown(page, key) == float(f'{value:.4g}'), key
     assert page.locator('#ring-height').inner_text() == '–'  # not valid: wider than the pad
-    drawn = page.locator('svg[aria-label*="Cut through one pad"]').get_attribute('aria-label')
+    drawn = page.locator('[aria-label*="Cut through one pad"]').get_attribute('aria-label')
     assert f'contact radius {1e3 * said["pressed"]["contact_radius_m"]:.3g} mm' in drawn
 
 
@@ -141,48 +141,69 @@ def test_other_names_and_pages_are_refused_and_ctrl_c_ends_it():
         assert said == ['pad: stopped']
 
 
-def test_changes_that_come_meanwhile_are_answered_together():
-    state, computed, shown, waited = [0], [], [], []
-    go = threading.Event()
+class Shown:
+    """In place of the elements of a page: keeps what they are told."""
 
-    def compute():
-        computed.append(state[0])
-        go.wait()
-        return computed[-1]
+    def __init__(self):
+        self.said = []
 
-    async def scenario() -> None:
-        latest = explore_page.Latest(compute, shown.append, lambda words: waited.append(words))
-        latest.ask()
-        while not waited:
-            await asyncio.sleep(0.001)
-        for state[0] in range(1, 10):
-            latest.ask()
-        go.set()
-        while shown != [0, 9]:
-            await asyncio.sleep(0.001)
+    def classes(self, **words):
+        self.said.append(words)
+
+    def set_text(self, text):
+        self.said.append(text)
+
+
+def asked(monkeypatch, compute, scenario):
+    """Let a page without elements answer by a function; return what was shown of it."""
+    monkeypatch.setattr(explore_page, 'answer', compute)
+    element, shown = Shown(), []
+
+    async def play():
+        page = explore_page.Page({'load': 0})
+        page._status, page._answers = element, (element,)
+        page._show = lambda found: shown.append(found)
+        await asyncio.wait_for(scenario(page), 60.0)
 
     # Beside the event loop of the browser's driver.
     with ThreadPoolExecutor() as pool:
-        pool.submit(asyncio.run, asyncio.wait_for(scenario(), 60.0)).result()
-    assert computed == [0, 9]
-    assert waited[0] == 'computing …'
+        pool.submit(asyncio.run, play()).result()
+    return shown, element.said
 
 
-def test_an_answer_that_fails_leaves_no_old_numbers_as_new():
-    said = []
+def test_changes_that_come_meanwhile_are_answered_together(monkeypatch):
+    computed, begun, go = [], threading.Event(), threading.Event()
 
-    def compute():
+    def compute(inputs):
+        computed.append(inputs['load'])
+        begun.set()
+        go.wait()
+        return (inputs['load'],)
+
+    async def scenario(page):
+        first = asyncio.ensure_future(page.answer())
+        await asyncio.to_thread(begun.wait)
+        others = [asyncio.ensure_future(page.change('load', load)) for load in range(1, 10)]
+        await asyncio.sleep(0.0)
+        go.set()
+        await asyncio.gather(first, *others)
+
+    shown, said = asked(monkeypatch, compute, scenario)
+    assert computed == shown == [0, 9]
+    # Old numbers stay pale until the last answer.
+    assert said == [{'add': 'stale'}] * 10 + [{'remove': 'stale'}]
+
+
+def test_an_answer_that_fails_leaves_no_old_numbers_as_new(monkeypatch):
+    def compute(inputs):
         raise ValueError('broken')
 
-    async def scenario() -> None:
-        latest = explore_page.Latest(compute, said.append, said.append)
-        latest.ask()
+    async def scenario(page):
         with pytest.raises(ValueError, match='broken'):
-            await latest._task
+            await page.answer()
 
-    with ThreadPoolExecutor() as pool:
-        pool.submit(asyncio.run, scenario()).result()
-    assert said[-1] == 'no answer: broken'
+    shown, said = asked(monkeypatch, compute, scenario)
+    assert shown == [] and said == [{'add': 'stale'}, 'no answer: broken']
 
 
 def test_without_the_extra_the_remedy_is_printed(monkeypatch, capsys):

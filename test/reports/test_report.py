@@ -2,7 +2,6 @@
 import base64
 import dataclasses
 import html.parser
-import json
 import re
 import resource
 import warnings
@@ -172,15 +171,6 @@ def test_a_report_needs_no_other_file_and_no_network(walk, tmp_path):
         assert all(value.startswith(('#', 'data:image/png')) for value in references)
     for words in ('hexapod_patches', 'seed 0', 'simulation L2', 'has and leaves out'):
         assert words in seen.text
-
-
-def test_the_same_trial_gives_the_same_file(tmp_path):
-    """Also where its settings come from the JSON of a bag."""
-    trial = made_up()
-    report.write(trial, tmp_path / 'one.html')
-    trial.settings = json.loads(json.dumps(trial.settings))
-    report.write(trial, tmp_path / 'two.html')
-    assert (tmp_path / 'one.html').read_bytes() == (tmp_path / 'two.html').read_bytes()
 
 
 def test_a_full_disk_leaves_nothing_half_written(tmp_path):

@@ -77,16 +77,15 @@ def test_page(folder):
     # Flat feet at 0.5 N walk 20 to 34 mm in steps of 2; Student's t for 7 degrees is 2.365.
     half = 2.3646 * 2.0 * 6.0**0.5 / 8.0**0.5
     mean = f'27.0 {27.0 - half:.1f} to {27.0 + half:.1f}'
-    assert f'0.5 flat 8 0 {mean} 3.0 3.5 75.0' in words
+    assert f'0.5 flat 8 0 {mean}' in words
     # At 0.25 N one trial with domes failed, and one with flat feet ended early.
     assert '0.25 dome 7 1' in words
-    # Seed 6 ended early: the median of the switches is that of the seeds 0 to 5 and 7.
-    assert re.search(r'0\.25 flat 7 1 \S+ \S+ to \S+ 3\.0 3\.0 75\.0', words)
     found = sweeps.read(folder)
     means = [1e3 * each.mean for each in sweeps.points(found.rows, found.sweep.parameters)]
     (axes,) = pages.drawn(found).figure.axes
     marks = [line.get_ydata()[0] for line in axes.lines if line.get_marker() in ('s', '^')]
     assert sorted(marks) == pytest.approx(sorted(means))
+    assert sum(line.get_markerfacecolor() == 'white' for line in axes.lines) == 2  # left out
     assert 'ValueError: &lt;oh&gt;' in text and 'it fell' in words
     again = 'pad sweep leg_wet_flat --policy dome --seed 7 --set body.rolling_drag=0.25'
     assert again in words
