@@ -135,6 +135,7 @@ def _jazzy() -> Any:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
+@functools.cache
 def definition_of(type_name: str) -> tuple[str, str]:
     """Return definition and RIHS01 hash of a message type of ROS 2 Jazzy itself.
 

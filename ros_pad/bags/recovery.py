@@ -8,14 +8,14 @@ import json
 import os
 import pathlib
 import re
-from collections import Counter
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from mcap.records import Channel, Message, Schema
 
 from ros_pad.bags import metadata
-from ros_pad.bags.storage import Damage, records, shares
+from ros_pad.bags.storage import Contents, records, scan_all, shares
 from ros_pad.bags.writer import BagWriter
 from ros_pad.errors import BagError
 from ros_pad.pace import Progress, part
@@ -56,15 +56,6 @@ class Repair:
         """Whether there is nothing to repair."""
         whole = self.closed and not self.damaged_chunks and not self.unread_bytes
         return whole and self.described
-
-
-@dataclass
-class _File:
-    """One MCAP file, with the channels and schemas of its messages."""
-
-    path: pathlib.Path
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
 
 
 def inspect(source: str | os.PathLike[str], progress: Progress | None = None) -> Repair:
@@ -118,12 +109,12 @@ def repair(
         raise BagError(f'{source}: none of its messages can be read: nothing can be repaired')
     done, reach = 0, part(progress, 0.5, 1.0)
     with BagWriter(folder, _custom_data(source)) as writer:
-        for name, (channel, schema) in _topics(source, files).items():
+        for name, (channel, schema) in _topics(source, files.values()).items():
             writer.copy_topic(dataclasses.replace(channel, topic=name), schema)
-        for file in files:
-            for _, record in records(file.path, Damage()):
-                if isinstance(record, Message) and record.channel_id in file.channels:
-                    topic = file.channels[record.channel_id].topic
+        for path, contents in files.items():
+            for record in records(path, Contents()):
+                if isinstance(record, Message) and record.channel_id in contents.channels:
+                    topic = contents.channels[record.channel_id].topic
                     writer.write(topic, record.data, record.log_time, record.publish_time)
                     done += 1
                     reach(done / found.messages)
@@ -148,36 +139,26 @@ def _files(source: pathlib.Path) -> list[pathlib.Path]:
     return files
 
 
-def _examine(source: pathlib.Path, progress: Progress) -> tuple[list[_File], Repair]:
-    """Return all files with their topics, and the findings.
-
-    This reads all files once, because the topic of a message may be declared after the message.
-    """
-    files = [_File(path) for path in _files(source)]
-    total = Repair()
-    for file, reach in zip(files, shares([file.path for file in files], progress), strict=True):
-        counts, damage = Counter[int](), Damage()
-        for share, record in records(file.path, damage):
-            if reach:
-                reach(share)
-            match record:
-                case Schema():
-                    file.schemas[record.id] = record
-                case Channel():
-                    file.channels[record.id] = record
-                case Message():
-                    counts[record.channel_id] += 1
-        total.closed = total.closed and damage.closed
-        total.damaged_chunks += damage.chunks
-        total.unread_bytes += damage.unread
-        known = sum(count for channel, count in counts.items() if channel in file.channels)
-        total.messages += known
-        total.lost_messages += counts.total() - known
-    total.described = _described(source, files, total.messages)
-    return files, total
+def _examine(
+    source: pathlib.Path, progress: Progress
+) -> tuple[dict[pathlib.Path, Contents], Repair]:
+    """Return the contents of all files, and the findings."""
+    files = _files(source)
+    reach = shares(files, progress)
+    found = {file: scan_all(file, each) for file, each in zip(files, reach, strict=True)}
+    parts = found.values()
+    messages = sum(each.message_count for each in parts)
+    return found, Repair(
+        messages=messages,
+        damaged_chunks=sum(each.damaged_chunks for each in parts),
+        lost_messages=sum(each.lost_messages for each in parts),
+        unread_bytes=sum(each.unread_bytes for each in parts),
+        closed=all(each.closed for each in parts),
+        described=_described(source, files, messages),
+    )
 
 
-def _topics(source: pathlib.Path, files: list[_File]) -> dict[str, tuple[Channel, Schema]]:
+def _topics(source: pathlib.Path, files: Iterable[Contents]) -> dict[str, tuple[Channel, Schema]]:
     """Return channel and message type of each topic in all files."""
     topics: dict[str, tuple[Channel, Schema]] = {}
     for file in files:
@@ -201,17 +182,14 @@ def _information(source: pathlib.Path) -> dict[str, Any]:
         return {}
 
 
-def _described(source: pathlib.Path, files: list[_File], messages: int) -> bool:
+def _described(source: pathlib.Path, files: list[pathlib.Path], messages: int) -> bool:
     """Return whether the metadata names these files and this number of messages."""
     information = _information(source)
     try:
         names = {pathlib.PurePath(name).name for name in information['relative_file_paths']}
     except (KeyError, TypeError):
         return False
-    return (
-        names == {file.path.name for file in files}
-        and information.get('message_count') == messages
-    )
+    return names == {file.name for file in files} and information.get('message_count') == messages
 
 
 def _custom_data(source: pathlib.Path) -> dict[str, str]:

@@ -79,7 +79,6 @@ class BagWriter:
         self._topics: dict[str, dict[str, Any]] = {}  # entries of metadata.yaml
         self._channels: dict[str, int] = {}  # empty once the bag is closed
         self._schemas: dict[str, int] = {}
-        self._types: dict[str, tuple[str, str]] = {}  # definition and hash
         self._next_flush = 0.0
         self._stream: IO[bytes] | None = None
         # Another thread waits for the disk, so that the caller does not.
@@ -120,9 +119,7 @@ class BagWriter:
         BagError
             When the type is not installed, the topic is there already, or the bag is closed.
         """
-        if type_name not in self._types:
-            self._types[type_name] = definition_of(type_name)
-        definition, known_hash = self._types[type_name]
+        definition, known_hash = definition_of(type_name)
         about = {'offered_qos_profiles': qos, 'topic_type_hash': known_hash}
         self.copy_topic(
             Channel(id=0, topic=name, message_encoding='cdr', metadata=about, schema_id=0),
