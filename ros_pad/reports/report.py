@@ -103,10 +103,8 @@ def unobservable_shares(trial: Trial, load_gate: float) -> str:
 
     A foot stands with more than ``load_gate`` newtons. Empty where no doubts are on record.
     """
-    if not len(trial.doubt):
-        return ''
     ends = [
-        trial.doubt[np.maximum(rows - 1, 0), column]
+        trial.slow['doubt'][np.maximum(rows - 1, 0), column]
         for column, rows in enumerate(stance_ends(trial, load_gate))
     ]
     places, counts = np.unique(np.concatenate(ends), return_counts=True)

@@ -93,7 +93,7 @@ def window_of(view: View) -> tuple[float, float]:
     first, last = float(trial.slow_time[0]), float(trial.slow_time[-1])
     if last - first <= WINDOW:
         return (first, last)
-    changed = [trial.dome] if view.wet is None else [trial.dome, view.wet]
+    changed = [trial.slow['dome']] if view.wet is None else [trial.slow['dome'], view.wet]
     changes = np.concatenate([~each[:-1] & each[1:] for each in changed], axis=1)
     times = trial.slow_time[1:]
 

@@ -30,7 +30,7 @@ from ros_pad.pace import LATE, Progress, part
 from ros_pad.records import KINDS, Block, Kind
 from ros_pad.trials import label
 from ros_pad.trials.comparison import Stream
-from ros_pad.trials.series import by_row, held, series
+from ros_pad.trials.series import Poses, Records, by_row, trial_of
 from ros_pad.trials.trial import Trial, heading
 
 _KNOWN = {topic.pattern: topic for topic in TRIAL}
@@ -102,36 +102,23 @@ def load(
         settings['late'] = late(bag, part(progress, 0.8, 1.0))
     if progress:
         progress(1.0)
-    found = series(*(recording.streams[kind.name].block for kind in KINDS))
-    body, odom = (_poses(recording, topic, found['time']) for topic in (BODY_POSE, ODOM))
-    if body is None:
-        body = np.full((len(found['time']), 3), np.nan) if odom is None else odom
+    body, odom = (_poses(recording, topic) for topic in (BODY_POSE, ODOM))
     zero_ns = 0
     if bag.start > _FIRST_DATE_NS:
         zero_ns = bag.start
         moment = datetime.datetime.fromtimestamp(bag.start // 10**9, datetime.UTC)
         settings['recorded'] = f'{moment:%Y-%m-%d %H:%M:%S} UTC'
-    found |= {name: (found[name] - zero_ns) * 1e-9 for name in ('time', 'slow_time')}
     about['scene'] = pathlib.PurePath(about['scene']).stem
-    trial = Trial(
-        **about,
-        **found,
-        legs=recording.legs,
-        body=body,
-        odom=np.zeros((0, 3)) if odom is None else odom,
-    )
-    if odom is not None:
-        trial.move_to_world()
-    return trial
+    records = Records(*(recording.streams[kind.name].block for kind in KINDS))
+    return trial_of(records, recording.legs, body, odom, zero_ns, **about)
 
 
-def _poses(recording: Recording, topic: Topic, grid: np.ndarray) -> np.ndarray | None:
-    """Return x and y, m, and heading, rad, at times, ns, (n, 3); None if they are not recorded."""
+def _poses(recording: Recording, topic: Topic) -> Poses | None:
+    """Return what was recorded of x and y, m, and heading, rad; None if nothing was."""
     if topic not in recording.poses:
         return None
     stamps, _, values = _stamped(*recording.poses[topic])
-    poses = np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
-    return held(stamps, poses, grid)
+    return stamps, np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
 
 
 def _stamped(times: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

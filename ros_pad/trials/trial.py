@@ -14,6 +14,20 @@ from ros_pad.simulation.terrain import Floor
 
 BOUNCE = 0.03  # s; a stance does not end if a foot is without load for less than this
 
+SLOW = np.dtype(
+    [
+        ('pressure', 'f8'),  # gauge, Pa
+        ('setpoint', 'f8'),  # gauge, Pa
+        ('wetness', 'f8'),  # probability that the ground is wet
+        ('friction', 'f8'),  # estimated coefficient of friction
+        ('margin', 'f8'),  # friction margin
+        ('slip_speed', 'f8'),  # estimated, m/s
+        ('slipping', '?'),  # slip alarm
+        ('dome', '?'),  # whether the chosen morphology is dome
+        ('doubt', 'i8'),  # place in estimation.DOUBTS, 0: none; -1: not on record
+    ]
+)
+"""What is known of a foot at a control step; numbers that are unknown are NaN."""
 
 OFTEN = 3  # up to so many faults of one kind on one leg are listed one by one
 
@@ -149,25 +163,8 @@ class Trial:
         Measured position of each foot, m.
     slow_time : ndarray (m,)
         Time of each control step, s.
-    pressure : ndarray (m, legs)
-        Gauge pressure, Pa.
-    setpoint : ndarray (m, legs)
-        Set-point, gauge Pa.
-    wet_probability : ndarray (m, legs)
-        Probability of wet ground, 0 to 1.
-    friction : ndarray (m, legs)
-        Estimated coefficient of friction.
-    margin : ndarray (m, legs)
-        Friction margin, no unit.
-    slip_speed : ndarray (m, legs)
-        Estimated slip speed, m/s.
-    slipping : ndarray of bool (m, legs)
-        Slip alarm.
-    dome : ndarray of bool (m, legs)
-        Whether the chosen morphology is dome.
-    doubt : ndarray of int (m, legs)
-        Why the ground was unobservable, as an index in :data:`ros_pad.estimation.DOUBTS`; 0 if it
-        was observable, -1 if this is unknown. Shape (0, 0) where no doubts are on record.
+    slow : structured ndarray (m, legs)
+        What is known at each control step, see :data:`SLOW`.
     odom : ndarray (n, 3)
         Estimated position x and y of the body, m, and heading, rad, in odom; shape (0, 3) with
         markers. Feet are in the world all the same.
@@ -191,38 +188,12 @@ class Trial:
     force: np.ndarray
     position: np.ndarray
     slow_time: np.ndarray
-    pressure: np.ndarray
-    setpoint: np.ndarray
-    wet_probability: np.ndarray
-    friction: np.ndarray
-    margin: np.ndarray
-    slip_speed: np.ndarray
-    slipping: np.ndarray
-    dome: np.ndarray
+    slow: np.ndarray
+    odom: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     floor: Floor | None = None
     metrics: Metrics | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     real_time_factor: float | None = None
-    doubt: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=int))
-    odom: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-
-    def move_to_world(self) -> None:
-        """Move the feet of a trial with odom from there to the world of the body's true pose.
-
-        Odom is where the body estimator takes the robot to be; it drifts. Feet are placed by the
-        true pose of the body, as they stand to its estimated one.
-        """
-        turn = (self.body[:, 2] - self.odom[:, 2])[:, None]
-        cosine, sine = np.cos(turn), np.sin(turn)
-
-        def turned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-            return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=2)
-
-        arms = self.position[:, :, :2] - self.odom[:, None, :2]
-        self.position = self.position.copy()
-        self.position[:, :, :2] = self.body[:, None, :2] + turned(arms[..., 0], arms[..., 1])
-        self.force = self.force.copy()
-        self.force[:, :, :2] = turned(self.force[:, :, 0], self.force[:, :, 1])
 
     def standing(self, load_gate: float) -> np.ndarray:
         """Return whether each foot stands at each sensor sample.

@@ -12,6 +12,7 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import Trial, run
 from ros_pad.trials.metrics import stance_ends, summarise, time_to, wet_accuracy
+from ros_pad.trials.trial import SLOW
 
 SCENE = Scene.load('hexapod_patches')
 GATE = 2.0  # N
@@ -28,16 +29,16 @@ def written(load, x, wet_probability, pressure=None, floor=None):
     belief = np.array(wet_probability, dtype=float)
     steps = len(belief)
     assert steps == (samples + 1) // 2
-    zeros = np.zeros((steps, legs))
     force, position = np.zeros((samples, legs, 3)), np.zeros((samples, legs, 3))
     force[:, :, 2], position[:, :, 0] = load, x
+    slow = np.zeros((steps, legs), SLOW)
+    slow['wetness'] = belief
+    if pressure is not None:
+        slow['pressure'] = pressure
     return Trial(
         scene='written', policy='flat', fidelity='L1', seed=0, legs=tuple(range(1, legs + 1)),
-        time=0.1 * np.arange(1, samples + 1), body=np.zeros((samples, 3)),
-        force=force, position=position, slow_time=0.1 * np.arange(1, samples + 1, 2),
-        pressure=zeros if pressure is None else np.array(pressure, dtype=float),
-        setpoint=zeros, wet_probability=belief, friction=zeros, margin=zeros, slip_speed=zeros,
-        slipping=zeros > 1.0, dome=zeros > 1.0, floor=floor,
+        time=0.1 * np.arange(1, samples + 1), body=np.zeros((samples, 3)), force=force,
+        position=position, slow_time=0.1 * np.arange(1, samples + 1, 2), slow=slow, floor=floor,
     )  # fmt: skip
 
 
@@ -122,7 +123,7 @@ def test_metrics_agree_with_the_series():
     assert metrics.yaw_drift_rad == trial.body[-1, 2]
     assert metrics.duration_s == pytest.approx(scene.duration)
     assert metrics.cycles == pytest.approx(8.0)
-    changes = np.sum(trial.dome[1:] != trial.dome[:-1], axis=0)
+    changes = np.sum(trial.slow['dome'][1:] != trial.slow['dome'][:-1], axis=0)
     assert metrics.switches == changes.tolist()
     assert sum(metrics.switches) > 0
     # Slip paths are at least the advance of loaded markers, except for the shear of pads.
