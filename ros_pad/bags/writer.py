@@ -49,8 +49,6 @@ class BagWriter:
     ------
     BagError
         When the folder exists or cannot be created.
-    InvalidInput
-        When `custom_data` holds anything but text.
 
     Attributes
     ----------
@@ -65,7 +63,7 @@ class BagWriter:
     ) -> None:
         self.folder = pathlib.Path(folder)
         self.message_count = 0
-        self._custom_data = metadata.texts(custom_data)
+        self._custom_data = dict(custom_data or {})
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
@@ -204,13 +202,8 @@ class BagWriter:
         ----------
         custom_data : mapping of str to str
             Texts by key, added to the earlier ones.
-
-        Raises
-        ------
-        InvalidInput
-            When `custom_data` holds anything but text.
         """
-        self._custom_data |= metadata.texts(custom_data)
+        self._custom_data |= custom_data
         self._next_flush = 0.0
 
     def flush(self) -> None:

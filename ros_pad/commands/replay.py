@@ -8,13 +8,14 @@ import json
 import math
 import pathlib
 
+from ros_pad.bags import BagReader
 from ros_pad.commands.command import FILE, FOLDER, Commands, add_command, complain, print_table
 from ros_pad.commands.folder import PICTURES, check_pictures, refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.commands.sweep import pairs, typed
 from ros_pad.control import POLICIES
 from ros_pad.errors import BagError
-from ros_pad.trials import Replay, open_bag, replay, replayed_bag
+from ros_pad.trials import Replay, replay, replayed_bag
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.node_settings import NodeSettings
 
@@ -79,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     refuse_existing('--out', options.out)
     try:
         with bar('opening', 1.0, 'bag', delay=1.0) as show:
-            bag = open_bag(options.bag, show)
+            bag = BagReader(options.bag, show)
         settings = NodeSettings.of(bag).changed(values, options.policy, options.foot)
         with bar('replay', 1.0, 'bag') as show:
             found = replay(bag, settings, options.namespace, remaps, show)
@@ -90,8 +91,7 @@ def run(options: argparse.Namespace) -> int:
 
         draw(options.figure, found)
     if options.out is not None:
-        with bar('writing', 1.0, 'bag') as show:
-            replayed_bag.write(found, options.out, options.namespace, show)
+        replayed_bag.write(found, options.out, options.namespace)
     written = {name: getattr(options, name) for name in ('figure', 'out')}
     if options.json:
         paths = {name: None if path is None else str(path) for name, path in written.items()}

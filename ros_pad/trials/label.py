@@ -134,11 +134,12 @@ def made_with() -> dict[str, str]:
     The key ``git``, the description of the commit, exists only in a checkout of the repository.
     """
     versions = {'ros_pad': ros_pad.__version__}
-    folder = pathlib.Path(ros_pad.__file__).parent
-    # In a venv inside another repository, git would describe that repository.
-    ours = _git(folder, 'ls-files', '--error-unmatch', '__init__.py')
-    if ours and (description := _git(folder, 'describe', '--always', '--dirty', '--tags')):
-        versions['git'] = description
+    folder = pathlib.Path(ros_pad.__file__).parent.parent
+    if (folder / '.git').exists():
+        with contextlib.suppress(OSError, subprocess.SubprocessError):
+            words = ['git', '-C', str(folder), 'describe', '--always', '--dirty', '--tags']
+            said = subprocess.run(words, capture_output=True, text=True, timeout=5.0, check=True)
+            versions['git'] = said.stdout.strip()
     versions['python'] = platform.python_version()
     for package in ('numpy', 'scipy', 'mujoco', 'mcap'):
         with contextlib.suppress(metadata.PackageNotFoundError):
@@ -146,16 +147,6 @@ def made_with() -> dict[str, str]:
     if distro := os.environ.get('ROS_DISTRO'):
         versions['ros'] = distro
     return versions | {'system': f'{platform.system()} {platform.machine()}'}
-
-
-def _git(folder: pathlib.Path, *words: str) -> str:
-    """Return the output of git in a folder; empty where git fails or is not installed."""
-    with contextlib.suppress(OSError, subprocess.SubprocessError):
-        return subprocess.run(
-            ['git', '-C', str(folder), *words],
-            capture_output=True, text=True, timeout=5.0, check=True,
-        ).stdout.strip()  # fmt: skip
-    return ''
 
 
 def promise(trial: Trial) -> str:
@@ -191,10 +182,8 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
 def described(scene: Scene) -> dict[str, Any]:
     """Return a scene as plain values for JSON, nested like its YAML, in SI units."""
     values: dict[str, Any] = asdict(scene)
-    # Leave out the tables of a foot, which are computed from its other values.
-    values['foot'] = {
-        name: each for name, each in values['foot'].items() if not name.startswith('_')
-    }
+    # The tables of a foot are computed from its other values.
+    values['foot'] = {n: value for n, value in values['foot'].items() if n[0] != '_'}
     values['body'].pop('robot', None)  # its file is named
     values['faults'] = [str(fault) for fault in scene.faults]
     return values

@@ -45,34 +45,31 @@ class Others:
 
     @contextmanager
     def beside(self) -> Iterator[Others]:
-        """Walk in other processes as far as there are cores, until the block ends."""
-        free = min(workers.cores() - 1, len(self._policies))
-        if free < 1 or self._duration < SHORTEST:
+        """Walk in other processes until the block ends, if the scene is not too short."""
+        count = min(workers.cores(), len(self._policies))
+        if not count or self._duration < SHORTEST:
             yield self
             return
-        with workers.pool(free, os.nice, 5) as executor:  # behind the trial itself
+        with workers.pool(count, os.nice, 5) as executor:  # behind the trial itself
             for policy in self._policies:
                 self._walks[policy] = executor.submit(self._run, policy=policy)
             yield self
 
     def metrics(self, bar: Bar) -> dict[str, Metrics]:
-        """Return the metrics of the walks by policy; what has not begun is walked here.
+        """Return the metrics of the walks by policy; what no process walks is walked here.
 
         Raises
         ------
         PadError
             As :func:`ros_pad.trials.loop.run`.
         """
-        # From the last on: the others begin with the first.
-        trials = {policy: self._of(policy, bar) for policy in reversed(self._policies)}
-        found = {policy: trials[policy].metrics for policy in self._policies}
-        return {policy: each for policy, each in found.items() if each is not None}
-
-    def _of(self, policy: str, bar: Bar) -> Trial:
-        walk = self._walks.get(policy)
-        with bar(f'{policy:8} on the same ground', self._duration) as progress:
-            # A cancelled walk would let the others wait for ever if a process is killed.
-            if walk and (walk.running() or walk.done()):
+        found = {}
+        for policy in self._policies:
+            with bar(f'{policy:8} on the same ground', self._duration) as progress:
+                trial = None
                 with suppress(BrokenProcessPool):  # killed, possibly for lack of memory
-                    return walk.result()
-            return self._run(policy=policy, progress=progress)
+                    trial = self._walks[policy].result() if policy in self._walks else None
+                trial = trial or self._run(policy=policy, progress=progress)
+            if trial.metrics:
+                found[policy] = trial.metrics
+        return found

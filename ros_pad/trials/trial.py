@@ -29,8 +29,6 @@ SLOW = np.dtype(
 )
 """What is known of a foot at a control step; numbers that are unknown are NaN."""
 
-OFTEN = 3  # up to so many faults of one kind on one leg are listed one by one
-
 
 @dataclass(frozen=True)
 class Metrics:
@@ -99,31 +97,31 @@ class Metrics:
         return asdict(self)
 
 
-def fault_lines(faults: Iterable[dict[str, Any]]) -> list[str]:
-    """Describe faults of legs, one line each, see ``Metrics.faults``.
+def standing(time: np.ndarray, load: np.ndarray, load_gate: float) -> np.ndarray:
+    """Return whether feet stand at each time, s, (n, legs); see :meth:`Trial.standing`.
 
-    If a kind of fault occurred more than :data:`OFTEN` times on a leg, one line describes all.
+    A foot that bounces, without load for less than ``BOUNCE``, still stands.
     """
+    loaded = load > load_gate
+    since = np.maximum.accumulate(np.where(loaded, time[:, None], -np.inf), axis=0)
+    until = np.minimum.accumulate(np.where(loaded, time[:, None], np.inf)[::-1], axis=0)[::-1]
+    return until - since < BOUNCE
+
+
+def fault_lines(faults: Iterable[dict[str, Any]]) -> list[str]:
+    """Describe faults of legs, see ``Metrics.faults``: a line for each kind and leg."""
     alike: dict[tuple[int, str], list[dict[str, Any]]] = {}
     for fault in faults:
         alike.setdefault((fault['leg'], fault['kind']), []).append(fault)
     lines = []
-    for (leg, kind), found in alike.items():
-        if len(found) > OFTEN:
-            lines.append(
-                f'Leg {leg}, {len(found)} times from {found[0]["start"]:.1f} s to'
-                f' {_end(found[-1])}: {kind}'
-            )
-        else:
-            lines += [
-                f'Leg {leg}, from {each["start"]:.1f} s to {_end(each)}: {each["reason"]}'
-                for each in found
-            ]
+    for (leg, kind), own in alike.items():
+        start, end = own[0]['start'], own[-1]['end']
+        times, what = '', own[0]['reason']
+        if len(own) > 1:
+            times, what = f'{len(own)} times ', kind
+        until = 'the end' if end is None else f'{end:.1f} s'
+        lines.append(f'Leg {leg}, {times}from {start:.1f} s to {until}: {what}')
     return lines
-
-
-def _end(fault: dict[str, Any]) -> str:
-    return 'the end' if fault['end'] is None else f'{fault["end"]:.1f} s'
 
 
 def heading(x: float, y: float, z: float, w: float) -> float:
@@ -198,8 +196,6 @@ class Trial:
     def standing(self, load_gate: float) -> np.ndarray:
         """Return whether each foot stands at each sensor sample.
 
-        A foot that bounces, without load for less than ``BOUNCE``, still stands.
-
         Parameters
         ----------
         load_gate : float
@@ -210,11 +206,7 @@ class Trial:
         array of bool (n, legs)
             True in stance.
         """
-        loaded = self.force[:, :, 2] > load_gate
-        time = self.time[:, None]
-        since = np.maximum.accumulate(np.where(loaded, time, -np.inf), axis=0)
-        until = np.minimum.accumulate(np.where(loaded, time, np.inf)[::-1], axis=0)[::-1]
-        return until - since < BOUNCE
+        return standing(self.time, self.force[:, :, 2], load_gate)
 
     def wet(self) -> np.ndarray:
         """Return whether the true ground below each foot is wet.

@@ -55,16 +55,6 @@ def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, 
     assert sorted(shown.texts) == sorted(POLICIES)
 
 
-def test_what_has_not_begun_is_walked_here_meanwhile(monkeypatch, shown):
-    """With one other process, the last walk waits for the first ones."""
-    monkeypatch.setattr(workers, 'cores', lambda: 2)
-    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
-        found = walks.metrics(shown)
-    assert shown.texts[0] == 'oracle'
-    assert shown.places['oracle'] > 0.0
-    assert found == expected()
-
-
 def test_a_process_that_is_killed_costs_no_result(monkeypatch, shown):
     monkeypatch.setattr(workers, 'cores', lambda: 3)
     opened = []

@@ -2,6 +2,7 @@
 import dataclasses
 import json
 import math
+import operator
 
 import numpy as np
 import pytest
@@ -133,19 +134,22 @@ def test_a_recorded_trial_is_the_trial_to_the_bit(tmp_path):
 
 def test_other_rates_gaps_and_missing_topics_of_a_robot(tmp_path):
     start = 1_750_000_000 * 10**9  # 2025-06-15 15:06:40 UTC
-    with Recording(tmp_path / 'bag') as bag:
-        bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, 4.0), start, start)
+    messages = [
+        (0, 'leg_2/wrench', wrench(0.5, 0.0, 4.0)),
+        *((k * 10, 'leg_2/wrench', wrench(0.5, 0.0, float(k))) for k in range(1, 10)),
         # Positions of leg 2 start late and are slower; leg 5 has none.
-        for k in range(1, 10):
-            bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, float(k)), start, start + k * 10 * MS)
-        bag.add('/spider/leg_2/position', point(1.0, 2.0, 3.0), start, start + 25 * MS)
-        bag.add('/spider/leg_2/position', point(4.0, 5.0, 6.0), start, start + 60 * MS)
-        bag.add('/spider/leg_5/wrench', wrench(0.0, 0.0, 9.0), start, start + 31 * MS)
+        (25, 'leg_2/position', point(1.0, 2.0, 3.0)),
+        (60, 'leg_2/position', point(4.0, 5.0, 6.0)),
+        (31, 'leg_5/wrench', wrench(0.0, 0.0, 9.0)),
         # There is no estimator: pressures give the control times.
-        bag.add('/spider/leg_5/pressure', pressure(20000.0), start, start + 15 * MS)
-        bag.add('/spider/leg_5/pressure', pressure(30000.0), start, start + 35 * MS)
-        bag.add('/spider/leg_5/pressure_setpoint', pressure(30000.0), start, start + 15 * MS)
-        bag.add('/spider/leg_2/slip', slip(3e-3, 4e-3), start, start + 15 * MS)
+        (15, 'leg_5/pressure', pressure(20000.0)),
+        (35, 'leg_5/pressure', pressure(30000.0)),
+        (15, 'leg_5/pressure_setpoint', pressure(30000.0)),
+        (15, 'leg_2/slip', slip(3e-3, 4e-3)),
+    ]
+    with Recording(tmp_path / 'bag') as bag:
+        for ms, name, message in sorted(messages, key=operator.itemgetter(0)):
+            bag.add(f'/spider/{name}', message, start + ms * MS, start + ms * MS)
         bag.add('/spider/joint_states', Float64(), start)
         bag.add('/other/leg_count', Float64(), start)
     trial = recorded.load(tmp_path / 'bag')

@@ -24,7 +24,7 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.trials.comparison import Stream, compare
 from ros_pad.trials.label import CHANGES, PARAMETERS
 from ros_pad.trials.node_settings import NodeSettings
-from ros_pad.trials.replay import open_bag, replay
+from ros_pad.trials.replay import replay
 
 pytest.importorskip('rosbags', reason='bags of other robots are written with rosbags')
 
@@ -45,7 +45,7 @@ QUANTITIES = len(ESTIMATE.fields) + len(COMMAND.fields)
 
 
 def found_in(bag, values=None, namespace=None, remaps=None, **changes):
-    bag = open_bag(bag)
+    bag = BagReader(bag)
     settings = NodeSettings.of(bag).changed(values, **changes)
     return replay(bag, settings, namespace, remaps)
 
@@ -135,7 +135,7 @@ shown = []
 
 @pytest.fixture(scope='module')
 def sample():
-    return replay(open_bag(SAMPLE), progress=shown.append)
+    return replay(BagReader(SAMPLE), progress=shown.append)
 
 
 def test_the_shipped_bag_is_replayed_as_it_was_recorded(sample):
@@ -154,7 +154,7 @@ def test_the_shipped_bag_is_replayed_as_it_was_recorded(sample):
     assert len(sample.comparisons) == 6 * QUANTITIES
     for each in sample.comparisons:
         assert each.compared == 301 and each.missing == each.not_recorded == 0
-        if each.quantity in ('doubt', 'morphology', 'slipping', 'setpoint'):
+        if each.quantity in ('doubt', 'dome', 'slipping', 'setpoint'):
             assert each.equal == each.compared
     assert set(sample.samples.values()) == {6 * 250}  # 1 s to settle, 5 cycles
 
@@ -198,7 +198,7 @@ def test_a_walk_on_nodes_is_replayed_to_the_bit(tmp_path):
 def test_another_policy_changes_decisions_alone():
     other = found_in(SAMPLE, policy='flat')
     for each in other.comparisons:
-        if each.quantity not in ('morphology', 'setpoint'):
+        if each.quantity not in ('dome', 'setpoint'):
             assert fine(each), each
     assert {each.switches[1] for each in other.outcomes} == {0}
     assert set(other.replayed[2, 'setpoint'].values[:, 0]) == {0.0}
@@ -413,7 +413,7 @@ def test_a_foot_that_falls_silent_is_doubted_as_the_node_does(tmp_path):
 def test_bags_in_sqlite_are_refused_with_the_way_out(tmp_path):
     bag = copy(tmp_path / 'bag', end=0.1, storage=StoragePlugin.SQLITE3)
     with pytest.raises(BagError, match='ros2 bag convert'):
-        open_bag(bag)
+        BagReader(bag)
 
 
 @pytest.mark.parametrize(
