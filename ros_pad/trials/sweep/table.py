@@ -20,7 +20,6 @@ import numpy as np
 from scipy.special import stdtrit
 
 import ros_pad
-from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput, PadError
 from ros_pad.trials.sweep.plan import Row, Sweep, scene_with
 from ros_pad.trials.trial import Trial, fault_lines
@@ -28,6 +27,7 @@ from ros_pad.trials.trial import Trial, fault_lines
 RESULTS = 'trials.sqlite'
 LAST_COLUMNS = ('level', 'verdict', 'error', 'real_time_factor')
 SCENE = 'scene '  # prefix of the fingerprint of a scene in an identity
+AXES = 'axes'  # key of what is combined, which may grow
 
 
 def columns_of(trial: Trial) -> Row:
@@ -44,18 +44,26 @@ def columns_of(trial: Trial) -> Row:
 
 
 def identity(sweep: Sweep) -> dict[str, Any]:
-    """Return version, fidelity, parameters and checksums of the scenes of a sweep.
+    """Return version, fidelity, parameters and checksums of the scenes of a sweep, and its axes.
 
-    Trials belong to one sweep only if these are the same; scenes may be added.
+    Trials belong to one sweep only if these are the same; scenes and values may be added.
     """
+    scenes = {name: scene_with(name, {}) for name in sweep.scenes}
     return {
         'version': ros_pad.__version__,
         'fidelity': sweep.fidelity,
         'parameters': sorted(sweep.parameters),
         # The representation of a scene holds all of its values, also those of its foot.
         **{
-            f'{SCENE}{each}': hashlib.sha256(repr(scene_with(each, {})).encode()).hexdigest()
-            for each in sweep.scenes
+            f'{SCENE}{name}': hashlib.sha256(repr(scene).encode()).hexdigest()
+            for name, scene in scenes.items()
+        },
+        AXES: {
+            'scenes': list(sweep.scenes),
+            'policies': list(sweep.policies or {each.policy: 0 for each in scenes.values()}),
+            'seeds': list(sweep.seeds),
+            'parameters': {name: list(each) for name, each in sweep.parameters.items()},
+            'fidelity': sweep.fidelity,
         },
     }
 
@@ -122,7 +130,8 @@ class Results:
         """Refuse another sweep, and one that lacks trials which are there."""
         for name, text in self._base.execute('SELECT name, value FROM about').fetchall():
             before, now = json.loads(text), about.get(name)
-            if before != now and not (name.startswith(SCENE) and now is None):
+            added = name == AXES or (name.startswith(SCENE) and now is None)
+            if before != now and not added:
                 raise InvalidInput(
                     f'{self.folder} holds a sweep with {name} {before}, not {now}: take a new'
                     ' folder'
@@ -200,7 +209,7 @@ class Found:
     folder : Path
         Folder of the sweep.
     sweep : Sweep
-        Scenes, policies, seeds and parameters of the finished trials.
+        Scenes, policies, seeds and parameters, also of trials that are not finished.
     rows : list of dict
         One row for each finished trial, in the order of the sweep, all with the same columns.
     about : dict
@@ -271,28 +280,13 @@ def read(folder: str | os.PathLike[str]) -> Found:
     if not rows:
         raise InvalidInput(f'{folder}: no trial of this sweep is finished')
     about = {name: json.loads(value) for name, value in pairs}
-    names = [name for name in rows[0] if name in ('scene', 'policy', 'seed', *about['parameters'])]
-    done = {name: {row[name] for row in rows} - {None} for name in names}
-    scenes = [name.removeprefix(SCENE) for name in about if name.startswith(SCENE)]
-    parameters = {name: _sorted(done[name]) for name in names if name in about['parameters']}
-    # A row begins with its labels, in the order of the command line. A sweep runs in the order of
-    # scenes, then parameters, then policies, then seeds.
-    axes: dict[str, list[Any]] = {
-        'scene': [each for each in scenes if each in done['scene']],
-        **parameters,
-        'policy': [each for each in POLICIES if each in done['policy']],
-        'seed': sorted(done['seed']),
-    }
+    sweep = Sweep(**about[AXES])
+    axes = {'scene': sweep.scenes, **sweep.parameters}
+    axes |= {'policy': sweep.policies, 'seed': sweep.seeds}
     rows.sort(key=lambda row: [
         own.index(row[name]) if row[name] is not None else -1 for name, own in axes.items()
     ])  # fmt: skip
-    sweep = Sweep(axes['scene'], axes['policy'], axes['seed'], parameters, about['fidelity'])
     return Found(folder, sweep, _aligned(rows), about)
-
-
-def _sorted(values: Iterable[Any]) -> list[Any]:
-    """Return numbers in their order, or texts in the alphabetical one."""
-    return sorted(values, key=lambda each: (isinstance(each, str), each))
 
 
 @dataclass(frozen=True)
