@@ -148,10 +148,7 @@ class BagReader:
         return files
 
     def messages(
-        self,
-        topics: Collection[str] | None = None,
-        containing: bytes = b'',
-        progress: Progress | None = None,
+        self, topics: Collection[str] | None = None, progress: Progress | None = None
     ) -> Iterator[tuple[str, Any, int]]:
         """Yield topic, decoded message and log time in ns of each message.
 
@@ -159,8 +156,6 @@ class BagReader:
         ----------
         topics : collection of str, optional
             Topics to read, by default all; a topic that the bag does not have yields nothing.
-        containing : bytes
-            Messages without these bytes are left out.
         progress : callable or None
             Called now and then with the share that is done, 0 to 1.
 
@@ -180,8 +175,7 @@ class BagReader:
         """
         topics = self.topics if topics is None else topics
         for topic, log_time, data in self._raw(topics, progress):
-            if containing in data:
-                yield topic, self._decoded(topic, data, log_time), log_time
+            yield topic, self._decoded(topic, data, log_time), log_time
 
     def tables(self, paths: Mapping[str, Sequence[str]]) -> dict[str, Table]:
         """Return log times and numbers of all messages on some topics.

@@ -235,7 +235,8 @@ def write(
         parts.append(f'<h2>Where the ground was observable</h2><p>{html.escape(words)}</p>')
     parts += [
         '<h2>What the model has and leaves out</h2>' + note + _terms_table(trial.settings),
-        '<h2>Conditions</h2>' + plain_table(conditions.rows(trial)),
+        '<h2>Conditions</h2><p>In SI units; pressures gauge.</p>',
+        plain_table(conditions.rows(trial)),
     ]
     save(path, page(f'{name}: ros_pad', parts).encode())
 

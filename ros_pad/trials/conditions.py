@@ -10,32 +10,20 @@ from typing import Any
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.trial import Trial
 
-# Units of the values of a scene and a foot, by name; a value that is not listed has no unit.
-_UNITS = {
-    'mass': 'kg', 'inertia': 'kg m²', 'height': 'm', 'homes': 'm', 'leg_stiffness': 'N/m',
-    'rolling_drag': 'N', 'load': 'N', 'goal': 'm',
-    'cycle': 's', 'stride': 'm', 'lift': 'm', 'stroke': 'm', 'stance': 's', 'swing': 's',
-    'heading_gain': '1/s', 'film_thickness': 'm', 'viscosity': 'Pa s', 'patch_length': 'm',
-    'cell': 'm', 'slope': 'rad', 'roughness': 'm', 'unevenness': 'm', 'weight': 'N',
-    'distance': 'm', 'stiffness': 'N/m', 'rate': 'Hz', 'force': 'N', 'position': 'm',
-    'moment': 'N m', 'hose_diameter': 'm', 'hose_length': 'm', 'hose_conductance': 'm³/(s Pa)',
-    'radius': 'm', 'adhesion_energy': 'J/m²', 'sole_radius': 'm', 'shear_strength': 'Pa',
-    'conforming_pressure': 'Pa', 'critical_film': 'm', 'shear_stiffness': 'N/m',
-    'chamber_volume': 'm³', 'ceiling': 'Pa', 'dome_pressure': 'Pa', 'settle': 's',
-    'pressure': 'Pa', 'ambient_pressure': 'Pa', 'capillary_force': 'N',
-    'measured limit slope': 'N/Pa',
-}  # fmt: skip
-
 
 def rows(trial: Trial) -> list[tuple[str, str]]:
-    """Return the conditions of a trial: names, and values with units, as text.
+    """Return the conditions of a trial: names and values, as text.
 
-    The values of the scene come from ``settings['conditions']``, which
+    The values of the scene, in SI units, come from ``settings['conditions']``, which
     `ros_pad.trials.label.described` made when the trial ran.
     """
     settings, own = trial.settings, trial.metrics
     recorded = settings.get('conditions') or {}
-    parts = {name: _listed(each) for name, each in recorded.items() if isinstance(each, Mapping)}
+    parts = {
+        name: ', '.join(_listed(each))
+        for name, each in recorded.items()
+        if isinstance(each, Mapping)
+    }
     # Simulated trials run at the default ambient pressure.
     ambient = settings.get(
         'ambient_pressure', AMBIENT_PRESSURE.default if trial.fidelity else None
@@ -52,8 +40,8 @@ def rows(trial: Trial) -> list[tuple[str, str]]:
         'foot': str(settings.get('foot') or ''),
         'robot': recorded.get('robot', ''),
         **parts,
-        'pressure of a dome': _quantity('pressure', recorded.get('dome_pressure')),
-        'ambient pressure': _quantity('pressure', ambient),
+        'pressure of a dome': f'{dome:g} Pa' if (dome := recorded.get('dome_pressure')) else '',
+        'ambient pressure': '' if ambient is None else f'{ambient:g} Pa',
         'scheduled faults': '; '.join(settings.get('faults', ())) or 'none',
         'recorded': settings.get('recorded', ''),
         'versions': ', '.join(f'{name} {version}' for name, version in versions.items()),
@@ -77,23 +65,15 @@ def _repeated_by(trial: Trial) -> str:
     return shlex.join(words)
 
 
-def _listed(values: Mapping[str, Any], of: str = '') -> str:
-    """Return the texts and numbers of a part of a scene, with their units."""
+def _listed(values: Mapping[str, Any], of: str = '') -> list[str]:
+    """Return the texts and numbers of a part of a scene, with the names of their keys."""
     found = []
     for name, value in values.items():
-        words = f'{of}{name.replace("_", " ")}'
         if isinstance(value, Mapping):
-            found.append(_listed(value, f'{words} '))
-        elif quantity := _quantity(words if words in _UNITS else name, value):
-            found.append(f'{words} {quantity}')
-    return ', '.join(found)
-
-
-def _quantity(name: str, value: Any) -> str:
-    """Return a text, or a number with its unit; empty for anything else."""
-    if isinstance(value, (int, float)):
-        return f'{value:.6g} {_UNITS.get(name, "")}'.rstrip()
-    return value if isinstance(value, str) else ''
+            found += _listed(value, f'{of}{name}.')
+        elif isinstance(value, (int, float, str)):
+            found.append(f'{of}{name} {value}')
+    return found
 
 
 __all__ = ['rows']

@@ -11,13 +11,12 @@ import os
 import pathlib
 import platform
 import subprocess
-from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import metadata
 from typing import Any
 
 import ros_pad
-from ros_pad.bags import BagReader
+from ros_pad.bags import BagReader, annotate
 from ros_pad.configuration import Setting
 from ros_pad.errors import BagError
 from ros_pad.simulation import fidelity as levels
@@ -55,48 +54,37 @@ def label(
     policy: str,
     seed: int,
     fidelity: str,
-    *,
-    interrupted: bool = False,
-    metrics: Metrics | None = None,
-    real_time_factor: float | None = None,
-    comparison: Sequence[dict[str, Any]] = (),
     sensing: str = 'markers',
+    interrupted: bool = False,
 ) -> dict[str, str]:
-    """Return the custom data of a trial's bag: JSON texts by key.
+    """Return the custom data of a trial's bag, which :func:`note` completes: texts by key.
 
     Parameters
     ----------
-    scene, policy, seed, fidelity
-        The conditions of the trial.
+    scene, policy, seed, fidelity, sensing
+        The conditions of the trial; ``sensing`` is ``markers`` or ``joints``.
     interrupted : bool
         Whether the trial was stopped before its end.
-    metrics, real_time_factor
-        Results of the trial; None before its end.
-    comparison : sequence of dict
-        Metrics of other policies on the same ground, each with its ``policy``.
-    sensing : str
-        ``markers`` or ``joints``.
     """
-    return {
-        KEY: json.dumps(
-            {
-                'scene': scene.source,
-                'policy': policy,
-                'seed': seed,
-                'fidelity': fidelity,
-                'floor': asdict(scene.floor),
-                'ambient_pressure': AMBIENT_PRESSURE.default,
-                'metrics': metrics.as_dict() if metrics else None,
-                'real_time_factor': real_time_factor,
-                'settings': settings(scene, policy, fidelity, sensing)
-                | {
-                    'interrupted': interrupted,
-                    'comparison': list(comparison),
-                },
-            }
-        ),
-        MADE_WITH: json.dumps(made_with()),
+    known = {
+        'scene': scene.source,
+        'policy': policy,
+        'seed': seed,
+        'fidelity': fidelity,
+        'floor': asdict(scene.floor),
+        'ambient_pressure': AMBIENT_PRESSURE.default,
+        'settings': settings(scene, policy, fidelity, sensing) | {'interrupted': interrupted},
     }
+    return {KEY: json.dumps(known), MADE_WITH: json.dumps(made_with())}
+
+
+def note(folder: str | os.PathLike[str], trial: Trial) -> None:
+    """Add the results of a trial, and the metrics of other policies, to its closed bag."""
+    known = json.loads(BagReader(folder).custom_data[KEY])
+    known['metrics'] = trial.metrics.as_dict() if trial.metrics else None
+    known['real_time_factor'] = trial.real_time_factor
+    known['settings']['comparison'] = trial.settings['comparison']
+    annotate(folder, {KEY: json.dumps(known)})
 
 
 def read(bag: BagReader) -> dict[str, Any]:
@@ -173,6 +161,7 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
         'fidelity_note': choice.note,
         'omitted': [each for each in known if not each['taken']],
         'taken': [each for each in known if each['taken']],
+        'comparison': [],
         'version': ros_pad.__version__,
         'versions': made_with(),
         'conditions': described(scene),

@@ -226,7 +226,7 @@ def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
     if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
         return []
     found: dict[str, list[tuple[float, str]]] = {}
-    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], LATE.encode(), progress):
+    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], progress):
         for status in array.status:
             if status.message.startswith(LATE):
                 seconds = (log_ns - bag.start) * 1e-9

@@ -360,13 +360,13 @@ def test_conditions_have_values_and_units(walk):
     rows = dict(conditions.rows(walk))
     assert f'numpy {np.__version__}' in rows['versions'] and 'python 3.' in rows['versions']
     assert rows['scene'] == 'hexapod_patches' and rows['gait cycles'] == '3'
-    assert rows['robot'] == 'ch3r' and 'mass 2.09 kg' in rows['body']
-    assert 'pad stiffness 40 N/m' in rows['foot'] and 'limit slope' in rows['foot']
-    assert 'wet fraction 0.45' in rows['floor'] and 'viscosity 0.001 Pa s' in rows['floor']
-    assert 'weight 9 N' in rows['tow']
-    for value in ('250 Hz', '0.03 N', '0.00015 m', '0 N m'):
+    assert rows['robot'] == 'ch3r' and 'mass 2.09' in rows['body']
+    assert 'pad.stiffness 40.0' in rows['foot'] and 'ceiling 90000.0' in rows['foot']
+    assert 'wet_fraction 0.45' in rows['floor'] and 'viscosity 0.001' in rows['floor']
+    assert 'weight 9' in rows['tow']
+    for value in ('rate 250', 'force 0.03', 'position 0.00015'):
         assert value in rows['sensors']
-    assert 'hose diameter 0.004 m' in rows['regulator']
+    assert 'hose_diameter 0.004' in rows['regulator']
     assert rows['command to repeat it'] == (
         'pad run hexapod_patches --policy adaptive --seed 0 --fidelity L2 --cycles 3'
         ' --foot large37'

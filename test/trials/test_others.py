@@ -12,7 +12,6 @@ from ros_pad import workers
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop, others
 from ros_pad.trials.node_settings import tuning_for
-from ros_pad.trials.others import Others
 
 SCENE = dataclasses.replace(Scene.load('hexapod_patches'), cycles=2)
 POLICIES = ('flat', 'dome', 'oracle')
@@ -47,8 +46,8 @@ def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, 
     tuning = tuning_for(SCENE, 'markers')
     tuning = dataclasses.replace(tuning, scale_flat_wet=3.0, scale_sd_flat_wet=0.01)
     monkeypatch.setattr(workers, 'cores', lambda: cores)
-    with Others(SCENE, POLICIES, 1, 'L1', tuning=tuning).beside() as walks:
-        found = walks.metrics(shown)
+    with others.beside(SCENE, POLICIES, 1, 'L1', 'markers', tuning) as metrics:
+        found = metrics(shown)
     assert found == expected(tuning)
     assert found['flat'].wet_accuracy > loop.run(SCENE, 'flat', 1, 'L1').metrics.wet_accuracy
     assert list(found) == list(POLICIES)
@@ -67,7 +66,7 @@ def test_a_process_that_is_killed_costs_no_result(monkeypatch, shown):
             yield executor
 
     monkeypatch.setattr(workers, 'pool', watched)
-    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
+    with others.beside(SCENE, POLICIES, 1, 'L1', 'markers', None) as metrics:
         for pid in list(opened[0]._processes):
             os.kill(pid, signal.SIGKILL)
-        assert walks.metrics(shown) == expected()
+        assert metrics(shown) == expected()
