@@ -108,7 +108,9 @@ def repair(
     if not found.messages:
         raise BagError(f'{source}: none of its messages can be read: nothing can be repaired')
     done, reach = 0, part(progress, 0.5, 1.0)
-    with BagWriter(folder, _custom_data(source)) as writer:
+    about = _known(source).get('custom_data')
+    texts = about.items() if isinstance(about, dict) else ()
+    with BagWriter(folder, {str(key): str(text) for key, text in texts}) as writer:
         for name, (channel, schema) in _topics(source, files.values()).items():
             writer.copy_topic(dataclasses.replace(channel, topic=name), schema)
         for path, contents in files.items():
@@ -118,7 +120,7 @@ def repair(
                     writer.write(topic, record.data, record.log_time, record.publish_time)
                     done += 1
                     reach(done / found.messages)
-        writer.close({KEY: json.dumps({'source': source.name} | asdict(found))})
+        writer.describe({KEY: json.dumps({'source': source.name} | asdict(found))})
     return found
 
 
@@ -174,7 +176,7 @@ def _topics(source: pathlib.Path, files: Iterable[Contents]) -> dict[str, tuple[
     return topics
 
 
-def _information(source: pathlib.Path) -> dict[str, Any]:
+def _known(source: pathlib.Path) -> dict[str, Any]:
     """Return the metadata of a bag; empty when it is missing or damaged."""
     try:
         return metadata.read(source)
@@ -184,15 +186,11 @@ def _information(source: pathlib.Path) -> dict[str, Any]:
 
 def _described(source: pathlib.Path, files: list[pathlib.Path], messages: int) -> bool:
     """Return whether the metadata names these files and this number of messages."""
-    information = _information(source)
-    try:
-        names = {pathlib.PurePath(name).name for name in information['relative_file_paths']}
-    except (KeyError, TypeError):
-        return False
-    return names == {file.name for file in files} and information.get('message_count') == messages
-
-
-def _custom_data(source: pathlib.Path) -> dict[str, str]:
-    """Return the custom data of the broken bag, if that can be read."""
-    data = _information(source).get('custom_data')
-    return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}
+    known = _known(source)
+    names = known.get('relative_file_paths')
+    return (
+        isinstance(names, list)
+        and sorted(pathlib.PurePath(str(name)).name for name in names)
+        == sorted(file.name for file in files)
+        and known.get('message_count') == messages
+    )

@@ -230,15 +230,10 @@ class BagWriter:
             self._fail(error)
         self._next_flush = time.monotonic() + FLUSH_PERIOD
 
-    def close(self, custom_data: Mapping[str, str] | None = None) -> None:
+    def close(self) -> None:
         """Finish the file and write ``metadata.yaml`` with true counts and times.
 
         A second call does nothing.
-
-        Parameters
-        ----------
-        custom_data : mapping of str to str, optional
-            Added to the earlier custom data.
 
         Raises
         ------
@@ -247,7 +242,6 @@ class BagWriter:
         """
         if self._stream is None:
             return
-        self.describe(custom_data or {})
         try:
             self._writer.finish()
             self._disk.shutdown()

@@ -287,7 +287,8 @@ def test_misuse_is_refused(tmp_path):
         writer.write('/other', b'', 0)
     with pytest.raises(InvalidInput, match='-1 ns is not allowed: at least 0 ns'):
         writer.write('/data', b'', -1)
-    writer.close({'outcome': 'done'})
+    writer.describe({'outcome': 'done'})
+    writer.close()
     writer.close()
     assert BagReader(tmp_path / 'trial').custom_data == {'outcome': 'done'}
     for call in (
