@@ -41,6 +41,7 @@ NEEDED = ('force', 'position', 'velocity')
 
 _Piece: TypeAlias = tuple[int, int, int, dict[str, float]]
 _KNOWN = {topic.pattern: topic for topic in TRIAL}
+_NAME = r'(.*?/)(?:leg_(\d+)/)?((?:feet/|body/)?[^/]*)'  # namespace, leg, topic
 _FIRST_DATE_NS = 10**18  # a log time after 2001 is a date, an earlier one is simulated time
 
 
@@ -247,18 +248,15 @@ def _wanted(
     names = [*renamed.items(), *((topic, topic) for topic in bag.topics if topic not in there)]
     robots: dict[str, dict[str, tuple[Topic, int | None]]] = {}
     for full, name in names:
-        match = re.fullmatch(r'(.*/)leg_(\d+)(/\w+)', full)
-        own = next((each for each in _KNOWN if full.endswith(f'/{each}')), '')
-        own = f'leg_{{leg}}{match[3]}' if match else own
-        if own not in _KNOWN or not bag.counts[name]:
+        space, leg, own = re.fullmatch(_NAME, full).groups()  # type: ignore[union-attr]
+        topic = _KNOWN.get(f'leg_{{leg}}/{own}' if leg else own)
+        if topic is None or not bag.counts[name]:
             continue
-        topic = _KNOWN[own]
         if bag.topics[name] != topic.type_name:
             raise BagError(
                 f'{bag.path}: {name} is a {bag.topics[name]}: {topic.type_name} is needed'
             )
-        robot = robots.setdefault(match[1] if match else full.removesuffix(own), {})
-        robot[name] = topic, int(match[2]) if match else None
+        robots.setdefault(space, {})[name] = topic, int(leg) if leg else None
     robots = {
         each: own for each, own in robots.items() if any(topic.record for topic, _ in own.values())
     }
