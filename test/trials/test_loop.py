@@ -41,6 +41,16 @@ def test_the_same_seed_is_the_same_trial_to_the_bit():
     assert np.array_equal(one.floor.wet_map, two.floor.wet_map)
 
 
+def test_another_seed_is_another_floor_and_other_noise():
+    walks = [ClosedLoop(short(1), 'flat', seed, 'L1') for seed in (1, 2)]
+    for loop in walks:
+        loop.tick()
+        loop.close()
+    one, other = ((loop.floor.wet_map, loop.log.records.sample.rows['force']) for loop in walks)
+    assert not np.array_equal(one[0], other[0])
+    assert not np.array_equal(one[1], other[1])
+
+
 @pytest.mark.parametrize('policy', ['flat', 'adaptive'])
 def test_set_points_follow_the_shapes_and_pressures_the_set_points(policy):
     trial = run(short(4), policy, seed=1)
