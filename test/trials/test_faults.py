@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import re
+import types
 
 import numpy as np
 import pytest
@@ -104,3 +105,16 @@ def test_a_foot_whose_position_is_no_number_is_vented_like_on_nodes(monkeypatch)
     assert re.search('estimate for 0.5 s; marker lost', loop.controller.fault(2))
     assert loop.controller.morphology(2) == 'flat'
     assert loop.controller.fault(1) == ''
+
+
+def test_pads_are_vented_when_commands_stop():
+    loop = ClosedLoop(dataclasses.replace(PATCHES, cycles=3), 'dome', 0, 'L1')
+    for _ in range(375):
+        loop.tick()
+    assert min(loop.pads) > 60e3
+    loop.pipeline = types.SimpleNamespace(process=lambda samples: (), tick=lambda now_ns: None)
+    for _ in range(250):
+        loop.tick()
+    now_ns = 625 * loop.period_ns
+    assert max(loop.supervision.read(now_ns, now_ns).rows[0]['pad']) < 1e3
+    loop.close()
