@@ -81,10 +81,6 @@ class Stream(NamedTuple):
                 rows[:, place] = self.block.rows[:, self.legs.index(leg)]
         return self._replace(legs=tuple(legs), block=Block(self.block.stamps, rows))
 
-    def ordered(self) -> Stream:
-        """Return the records in the order of their stamps."""
-        return self.where(np.argsort(self.block.stamps, kind='stable'))
-
     def values(self, name: str) -> np.ndarray:
         """Return the values of a field, (n, legs, components)."""
         values: np.ndarray = self.block.rows[name]

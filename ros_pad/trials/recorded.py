@@ -180,9 +180,10 @@ def read(
         if topic.columns or topic in (BODY_POSE, ODOM)
     }
     records, tables = bag.read(kinds, paths, progress)
-    streams = {
-        kinds[name].name: Stream(kinds[name], *own).ordered() for name, own in records.items()
-    }
+    streams = {}
+    for name, own in records.items():
+        stream = Stream(kinds[name], *own)
+        streams[stream.kind.name] = stream.where(np.argsort(stream.block.stamps, kind='stable'))
     pieces: dict[Kind, list[_Piece]] = {}
     for name, table in tables.items():
         topic, leg = wanted[name]
