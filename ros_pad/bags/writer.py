@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 from ros_pad.bags import metadata
 from ros_pad.bags.codec import definition_of
 from ros_pad.bags.storage import Contents, scan
+from ros_pad.configuration import instance
 from ros_pad.errors import BagError, InvalidInput
 
 CHUNK_SIZE = 192 * 1024
@@ -49,6 +50,8 @@ class BagWriter:
     ------
     BagError
         When the folder exists or cannot be created.
+    InvalidInput
+        When `custom_data` is no mapping.
 
     Attributes
     ----------
@@ -63,6 +66,7 @@ class BagWriter:
     ) -> None:
         self.folder = pathlib.Path(folder)
         self.message_count = 0
+        instance('custom_data', custom_data or {}, Mapping)
         self._custom_data = dict(custom_data or {})
         try:
             self.folder.mkdir(parents=True)
