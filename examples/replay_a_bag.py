@@ -8,12 +8,13 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-from ros_pad.trials import NodeSettings, open_bag, replay
+from ros_pad.bags import BagReader
+from ros_pad.trials import NodeSettings, replay
 
 BAG = Path(__file__).resolve().parents[1] / 'bags/hexapod_patches/bag'  # <- your bag
 CHANGES = {'wet_prior': 0.2}  # names as on the page of the parameters
 
-bag = open_bag(BAG)
+bag = BagReader(BAG)
 found = replay(bag, NodeSettings.of(bag).changed(CHANGES))
 print(f'{found.duration_s:.2f} s of legs {found.legs} with {CHANGES}; compared: {found.verdict}')
 for leg in found.outcomes:

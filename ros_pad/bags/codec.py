@@ -14,7 +14,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from ros_pad.errors import BagError
 
-_ENCAPSULATION_SIZE = 4
 _LONGEST_ARRAY = 65536
 """Largest number of elements of a fixed-length array: rosbags generates code for each one."""
 
@@ -69,7 +68,8 @@ class MessageType:
             raise ValueError(f'encapsulation {data[:2].hex()} is not 0000 or 0001, plain CDR')
         of = self._type
         read = of.deserialize_cdr_le if data[1] else of.deserialize_cdr_be
-        message, _ = read(data[_ENCAPSULATION_SIZE:], 0, of.cls, self._store)
+        # Not deserialize_cdr of the store, which refuses the bytes with which DDS may pad.
+        message, _ = read(data[4:], 0, of.cls, self._store)
         return message
 
     def encode(self, message: Any) -> bytes:
@@ -135,6 +135,7 @@ def _jazzy() -> Any:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
+@functools.cache
 def definition_of(type_name: str) -> tuple[str, str]:
     """Return definition and RIHS01 hash of a message type of ROS 2 Jazzy itself.
 

@@ -14,8 +14,7 @@ import yaml
 from mcap.records import Channel, Schema
 
 from ros_pad.bags.storage import Contents
-from ros_pad.configuration import instance
-from ros_pad.errors import BagError, InvalidInput, reason
+from ros_pad.errors import BagError, reason
 from ros_pad.yaml_text import read_yaml
 
 _NAME = 'metadata.yaml'
@@ -130,34 +129,14 @@ def annotate(folder: str | os.PathLike[str], custom_data: Mapping[str, str]) -> 
     ------
     BagError
         When the folder has no valid metadata, or the metadata cannot be written.
-    InvalidInput
-        When `custom_data` holds anything but text.
     """
     folder = pathlib.Path(folder)
     information = read(folder)
     try:
-        information['custom_data'] = (information.get('custom_data') or {}) | texts(custom_data)
+        information['custom_data'] = {**(information.get('custom_data') or {}), **custom_data}
         _replace(folder, information)
     except (OSError, TypeError) as error:
         raise BagError(f'{folder}: {_NAME} cannot be changed: {error}') from error
-
-
-def texts(custom_data: Mapping[str, str] | None) -> dict[str, str]:
-    """Return a copy of custom data.
-
-    Raises
-    ------
-    InvalidInput
-        When a key or a value is not text.
-    """
-    if custom_data is not None:
-        instance('custom_data', custom_data, Mapping)
-    for key, value in (custom_data or {}).items():
-        if not isinstance(key, str) or not isinstance(value, str):
-            raise InvalidInput(
-                f'custom_data: {key!r}: {value!r} is not allowed: key and value must be text'
-            )
-    return dict(custom_data or {})
 
 
 def _replace(folder: pathlib.Path, information: Mapping[str, Any]) -> None:
@@ -186,4 +165,4 @@ class _NoAliasDumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ig
         return True
 
 
-__all__ = ['annotate', 'read', 'texts', 'topic_metadata', 'write']
+__all__ = ['annotate', 'read', 'topic_metadata', 'write']

@@ -3,19 +3,18 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import pathlib
 import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
-from mcap.records import Channel
+from mcap.records import Channel, Schema
 
 from ros_pad.bags import metadata
 from ros_pad.bags.codec import MessageType, field_getter, message_type
-from ros_pad.bags.storage import Contents, RawMessage, raw_messages, scan, shares
+from ros_pad.bags.storage import RawMessage, raw_messages, scan, shares
 from ros_pad.bags.wire import Wire, legs_of
 from ros_pad.errors import BadMessage, BagError, reason
 from ros_pad.pace import Progress
@@ -27,16 +26,12 @@ Table: TypeAlias = tuple[np.ndarray, np.ndarray]
 Recorded: TypeAlias = tuple[tuple[int, ...], np.ndarray, Block]
 """Numbers of the legs, log times, int64, ns, and all records of a topic."""
 
-_Batch: TypeAlias = dict[int, tuple[list[int], list[bytes]]]
-_BATCH = 10_000  # messages
-_NONE = np.empty(0, np.int64)
-
 
 class BagReader:
     """Read the messages of a bag, in the order in which they were written.
 
-    A bag whose writer was killed is read up to the damage; :attr:`problem` and a warning report
-    this, with the number of messages that can be read.
+    Of a bag whose writer was killed, all is read that can be; :attr:`problem` and a warning report
+    this, with the number of messages.
 
     Parameters
     ----------
@@ -61,7 +56,7 @@ class BagReader:
     message_count : int
         Number of messages that can be read.
     problem : str or None
-        Damage that leaves some messages readable; None without damage.
+        Damage that leaves some messages readable; None if none is known of.
 
     Raises
     ------
@@ -101,16 +96,14 @@ class BagReader:
         reach = shares(files, progress)
         self._files = [(file, scan(file, each)) for file, each in zip(files, reach, strict=True)]
         parts = [contents for _, contents in self._files]
-        for file, part in self._files:
-            for channel in part.channels.values():
-                if channel.schema_id and channel.schema_id not in part.schemas:
-                    raise BagError(
-                        f'{file}: is damaged: it has no message type of topic {channel.topic}'
-                    )
-        self.topics = {
-            channel.topic: part.schemas[channel.schema_id].name if channel.schema_id else ''
+        self._declared: dict[str, tuple[Channel, Schema | None]] = {
+            channel.topic: (channel, part.schemas.get(channel.schema_id))
             for part in parts
             for channel in part.channels.values()
+        }
+        self._types: dict[str, MessageType] = {}
+        self.topics = {
+            topic: schema.name if schema else '' for topic, (_, schema) in self._declared.items()
         }
         self.counts: dict[str, int] = {
             topic: sum(part.counts[topic] for part in parts) for topic in self.topics
@@ -120,10 +113,10 @@ class BagReader:
         self.start = min((part.start for part in filled), default=0)
         self.end = max((part.end for part in filled), default=0)
         self.problem: str | None = None
-        unfinished = ' and '.join(file.name for file, part in self._files if not part.finished)
+        unfinished = ' and '.join(file.name for file, part in self._files if not part.whole)
         if unfinished:
             self.problem = (
-                f'{self.path}: {unfinished} was not closed; '
+                f'{self.path}: {unfinished} was not closed, or is damaged; '
                 f'{self.message_count} messages can still be read'
             )
             if not self.message_count:
@@ -155,10 +148,7 @@ class BagReader:
         return files
 
     def messages(
-        self,
-        topics: Collection[str] | None = None,
-        containing: bytes = b'',
-        progress: Progress | None = None,
+        self, topics: Collection[str] | None = None, progress: Progress | None = None
     ) -> Iterator[tuple[str, Any, int]]:
         """Yield topic, decoded message and log time in ns of each message.
 
@@ -166,8 +156,6 @@ class BagReader:
         ----------
         topics : collection of str, optional
             Topics to read, by default all; a topic that the bag does not have yields nothing.
-        containing : bytes
-            Messages without these bytes are left out.
         progress : callable or None
             Called now and then with the share that is done, 0 to 1.
 
@@ -185,22 +173,11 @@ class BagReader:
         BagError
             When a message cannot be decoded, or a chunk of a closed file is damaged.
         """
-        for file, contents, reach in self._shared(progress):
-            wanted = _channels(contents, self.topics if topics is None else topics)
-            channels = {channel.id: channel for channel in wanted}
-            types: dict[int, MessageType] = {}
-            for channel_id, log_time, data in raw_messages(file, contents, channels, reach):
-                if containing not in data:
-                    continue
-                channel = channels[channel_id]
-                if channel_id not in types:
-                    types[channel_id] = _message_type(file, channel, contents)
-                message = _decoded(file, channel.topic, types[channel_id], data, log_time)
-                yield channel.topic, message, log_time
+        topics = self.topics if topics is None else topics
+        for topic, log_time, data in self._raw(topics, progress):
+            yield topic, self._decoded(topic, data, log_time), log_time
 
-    def tables(
-        self, paths: Mapping[str, Sequence[str]], progress: Progress | None = None
-    ) -> dict[str, Table]:
+    def tables(self, paths: Mapping[str, Sequence[str]]) -> dict[str, Table]:
         """Return log times and numbers of all messages on some topics.
 
         Parameters
@@ -208,8 +185,6 @@ class BagReader:
         paths : mapping
             Fields to read, such as ``wrench.force.x``, by topic; a topic that the bag does not
             have yields nothing.
-        progress : callable or None
-            Called now and then with the share that is done, 0 to 1.
 
         Returns
         -------
@@ -222,31 +197,27 @@ class BagReader:
         BagError
             When a field cannot be read, or a chunk of a closed file is damaged.
         """
-        return self.read({}, paths, progress)[1]
+        return self.read({}, paths)[1]
 
-    def records(
-        self, kinds: Mapping[str, Kind], progress: Progress | None = None
-    ) -> dict[str, Recorded]:
+    def records(self, kinds: Mapping[str, Kind]) -> dict[str, Recorded]:
         """Return all records on some topics.
 
         Parameters
         ----------
         kinds : mapping
             Kind of the records, by topic; a topic without messages is left out.
-        progress : callable or None
-            Called now and then with the share that is done, 0 to 1.
 
         Returns
         -------
         dict
-            By topic: numbers of the legs, log times, int64, ns, and the block of all records.
+            By topic: numbers of the legs, log times of all records, int64, ns, and their block.
 
         Raises
         ------
         BagError
             When a message is no record of its kind, or a chunk of a closed file is damaged.
         """
-        return self.read(kinds, {}, progress)[0]
+        return self.read(kinds, {})[0]
 
     def read(
         self,
@@ -275,45 +246,35 @@ class BagReader:
         BagError
             As they do.
         """
+        times: dict[str, list[int]] = {topic: [] for topic in (*kinds, *paths)}
         wires: dict[str, Wire] = {}
-        times: dict[str, list[np.ndarray]] = {topic: [_NONE] for topic in (*kinds, *paths)}
-        blocks: dict[str, list[Block]] = {}
-        tables = {topic: [np.empty((0, len(each)))] for topic, each in paths.items()}
-        for file, contents, reach in self._shared(progress):
-            channels = {each.id: each for each in _channels(contents, times)}
-            readers = {
-                channel.id: _reader(file, channel, contents, paths[channel.topic])
-                for channel in channels.values()
-                if channel.topic in paths
-            }
-            for batch in _batches(raw_messages(file, contents, channels, reach)):
-                for channel_id, (log_times, messages) in batch.items():
-                    topic = channels[channel_id].topic
-                    times[topic].append(np.array(log_times, np.int64))
-                    if channel_id in readers:
-                        of_type, get = readers[channel_id]
-                        rows = [
-                            get(_decoded(file, topic, of_type, each, log_time))
-                            for log_time, each in zip(log_times, messages, strict=True)
-                        ]
-                        tables[topic].append(np.array(rows, float))
-                        continue
-                    try:
-                        if topic not in wires:
-                            wires[topic] = Wire(kinds[topic], legs_of(messages[0]))
-                        blocks.setdefault(topic, []).append(wires[topic].table(messages))
-                    except BadMessage as error:
-                        raise BagError(f'{file}: a message on {topic}: {error}') from error
-        if progress:
-            progress(1.0)
-        joined = {topic: np.concatenate(each) for topic, each in times.items()}
+        blocks: dict[str, list[Block]] = {topic: [] for topic in kinds}
+        rows: dict[str, list[tuple[Any, ...]]] = {topic: [] for topic in paths}
+        getters = {topic: field_getter(each) for topic, each in paths.items()}
+        for topic, log_time, data in self._raw(times, progress):
+            try:
+                if topic in getters:
+                    message = self._decoded(topic, data, log_time)
+                    rows[topic].append(getters[topic](message))
+                    times[topic].append(log_time)
+                    continue
+                if topic not in wires:
+                    wires[topic] = Wire(kinds[topic], legs_of(data))
+                block = wires[topic].decode(data)
+            except (BadMessage, AttributeError, IndexError) as error:
+                raise BagError(f'{self.path}: a message on {topic}: {error}') from error
+            blocks[topic].append(block)
+            times[topic] += [log_time] * len(block.stamps)
+        joined = {topic: np.array(each, np.int64) for topic, each in times.items()}
         records = {
             topic: (wire.legs, joined[topic], Block.joined(wire.kind, blocks[topic], 0))
             for topic, wire in wires.items()
         }
-        return records, {
-            topic: (joined[topic], np.concatenate(each)) for topic, each in tables.items()
+        tables = {
+            topic: (joined[topic], np.array(each, float).reshape(len(each), len(paths[topic])))
+            for topic, each in rows.items()
         }
+        return records, tables
 
     def log_times(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """Return the log times of all messages on each topic, int64, ns, in the order of the file.
@@ -329,82 +290,44 @@ class BagReader:
             When a chunk of a closed file is damaged.
         """
         found: dict[str, list[int]] = {topic: [] for topic in self.topics}
-        for file, contents, reach in self._shared(progress):
-            lists = {each.id: found[each.topic] for each in contents.channels.values()}
-            for channel_id, log_time, _ in raw_messages(file, contents, lists, reach):
-                lists[channel_id].append(log_time)
+        for topic, log_time, _ in self._raw(found, progress):
+            found[topic].append(log_time)
         return {topic: np.array(times, np.int64) for topic, times in found.items()}
 
-    def _shared(
-        self, progress: Progress | None
-    ) -> Iterator[tuple[pathlib.Path, Contents, Progress | None]]:
-        """Yield each file with its contents and the callback of its share."""
+    def _raw(self, topics: Collection[str], progress: Progress | None) -> Iterator[RawMessage]:
+        """Yield topic, log time, ns, and bytes of the messages on some topics."""
         reach = shares([file for file, _ in self._files], progress)
         for (file, contents), each in zip(self._files, reach, strict=True):
-            yield file, contents, each
+            yield from raw_messages(file, contents, topics, each)
+        if progress:
+            progress(1.0)
 
+    def _decoded(self, topic: str, data: bytes, log_time: int) -> Any:
+        if topic not in self._types:
+            self._types[topic] = self._type(topic)
+        try:
+            return self._types[topic].decode(data)
+        except Exception as error:  # invalid bytes can raise any exception
+            raise BagError(
+                f'{self.path}: a message on {topic} at {log_time} ns cannot be decoded: {error}'
+            ) from error
 
-def _batches(messages: Iterator[RawMessage]) -> Iterator[_Batch]:
-    """Yield log times and bytes of messages by channel id, some thousands at a time."""
-    while some := list(itertools.islice(messages, _BATCH)):
-        found: _Batch = {}
-        for channel_id, log_time, data in some:
-            times, own = found.setdefault(channel_id, ([], []))
-            times.append(log_time)
-            own.append(data)
-        yield found
-
-
-def _channels(contents: Contents, topics: Collection[str]) -> list[Channel]:
-    """Return the channels of some topics; each file numbers its channels in its own way."""
-    return [
-        channel
-        for channel in contents.channels.values()
-        if contents.counts[channel.topic] and channel.topic in topics
-    ]
-
-
-def _message_type(file: pathlib.Path, channel: Channel, contents: Contents) -> MessageType:
-    schema = contents.schemas.get(channel.schema_id)
-    encoding = schema.encoding if schema else 'none'
-    if schema is None or (channel.message_encoding, encoding) != ('cdr', 'ros2msg'):
-        raise BagError(
-            f'{file}: topic {channel.topic}: messages with encoding {channel.message_encoding!r}'
-            f' and schema encoding {encoding!r} cannot be decoded: encoding'
-            " 'cdr' and schema encoding 'ros2msg' are needed"
-        )
-    try:
-        return message_type(schema.name, schema.data.decode())
-    except Exception as error:  # an invalid definition can raise any exception
-        raise BagError(
-            f'{file}: topic {channel.topic}: the definition of its message type {schema.name}'
-            f' cannot be used: {error}'
-        ) from error
-
-
-def _reader(
-    file: pathlib.Path, channel: Channel, contents: Contents, paths: Sequence[str]
-) -> tuple[MessageType, Callable[[Any], tuple[Any, ...]]]:
-    """Return message type and getter of the numbers of a channel."""
-    of_type, get = _message_type(file, channel, contents), field_getter(paths)
-    try:
-        np.array(get(of_type.blank()), float)
-    except Exception as error:  # no such field, no number, or a type that contains itself
-        raise BagError(
-            f'{file}: topic {channel.topic}: message type {of_type.name}: {error}'
-        ) from error
-    return of_type, get
-
-
-def _decoded(
-    file: pathlib.Path, topic: str, of_type: MessageType, data: bytes, log_time: int
-) -> Any:
-    try:
-        return of_type.decode(data)
-    except Exception as error:  # invalid bytes can raise any exception
-        raise BagError(
-            f'{file}: a message on {topic} at {log_time} ns cannot be decoded: {error}'
-        ) from error
+    def _type(self, topic: str) -> MessageType:
+        channel, schema = self._declared[topic]
+        encoding = schema.encoding if schema else 'none'
+        if schema is None or (channel.message_encoding, encoding) != ('cdr', 'ros2msg'):
+            raise BagError(
+                f'{self.path}: topic {topic}: messages with encoding {channel.message_encoding!r}'
+                f' and schema encoding {encoding!r} cannot be decoded: encoding'
+                " 'cdr' and schema encoding 'ros2msg' are needed"
+            )
+        try:
+            return message_type(schema.name, schema.data.decode())
+        except Exception as error:  # an invalid definition can raise any exception
+            raise BagError(
+                f'{self.path}: topic {topic}: the definition of its message type {schema.name}'
+                f' cannot be used: {error}'
+            ) from error
 
 
 __all__ = ['BagReader']

@@ -8,14 +8,14 @@ import json
 import os
 import pathlib
 import re
-from collections import Counter
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from mcap.records import Channel, Message, Schema
 
 from ros_pad.bags import metadata
-from ros_pad.bags.storage import Damage, records, shares
+from ros_pad.bags.storage import Contents, records, scan_all, shares
 from ros_pad.bags.writer import BagWriter
 from ros_pad.errors import BagError
 from ros_pad.pace import Progress, part
@@ -56,15 +56,6 @@ class Repair:
         """Whether there is nothing to repair."""
         whole = self.closed and not self.damaged_chunks and not self.unread_bytes
         return whole and self.described
-
-
-@dataclass
-class _File:
-    """One MCAP file, with the channels and schemas of its messages."""
-
-    path: pathlib.Path
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
 
 
 def inspect(source: str | os.PathLike[str], progress: Progress | None = None) -> Repair:
@@ -117,17 +108,19 @@ def repair(
     if not found.messages:
         raise BagError(f'{source}: none of its messages can be read: nothing can be repaired')
     done, reach = 0, part(progress, 0.5, 1.0)
-    with BagWriter(folder, _custom_data(source)) as writer:
-        for name, (channel, schema) in _topics(source, files).items():
+    about = _known(source).get('custom_data')
+    texts = about.items() if isinstance(about, dict) else ()
+    with BagWriter(folder, {str(key): str(text) for key, text in texts}) as writer:
+        for name, (channel, schema) in _topics(source, files.values()).items():
             writer.copy_topic(dataclasses.replace(channel, topic=name), schema)
-        for file in files:
-            for _, record in records(file.path, Damage()):
-                if isinstance(record, Message) and record.channel_id in file.channels:
-                    topic = file.channels[record.channel_id].topic
+        for path, contents in files.items():
+            for record in records(path, Contents()):
+                if isinstance(record, Message) and record.channel_id in contents.channels:
+                    topic = contents.channels[record.channel_id].topic
                     writer.write(topic, record.data, record.log_time, record.publish_time)
                     done += 1
                     reach(done / found.messages)
-        writer.close({KEY: json.dumps({'source': source.name} | asdict(found))})
+        writer.describe({KEY: json.dumps({'source': source.name} | asdict(found))})
     return found
 
 
@@ -148,36 +141,26 @@ def _files(source: pathlib.Path) -> list[pathlib.Path]:
     return files
 
 
-def _examine(source: pathlib.Path, progress: Progress) -> tuple[list[_File], Repair]:
-    """Return all files with their topics, and the findings.
-
-    This reads all files once, because the topic of a message may be declared after the message.
-    """
-    files = [_File(path) for path in _files(source)]
-    total = Repair()
-    for file, reach in zip(files, shares([file.path for file in files], progress), strict=True):
-        counts, damage = Counter[int](), Damage()
-        for share, record in records(file.path, damage):
-            if reach:
-                reach(share)
-            match record:
-                case Schema():
-                    file.schemas[record.id] = record
-                case Channel():
-                    file.channels[record.id] = record
-                case Message():
-                    counts[record.channel_id] += 1
-        total.closed = total.closed and damage.closed
-        total.damaged_chunks += damage.chunks
-        total.unread_bytes += damage.unread
-        known = sum(count for channel, count in counts.items() if channel in file.channels)
-        total.messages += known
-        total.lost_messages += counts.total() - known
-    total.described = _described(source, files, total.messages)
-    return files, total
+def _examine(
+    source: pathlib.Path, progress: Progress
+) -> tuple[dict[pathlib.Path, Contents], Repair]:
+    """Return the contents of all files, and the findings."""
+    files = _files(source)
+    reach = shares(files, progress)
+    found = {file: scan_all(file, each) for file, each in zip(files, reach, strict=True)}
+    parts = found.values()
+    messages = sum(each.message_count for each in parts)
+    return found, Repair(
+        messages=messages,
+        damaged_chunks=sum(each.damaged_chunks for each in parts),
+        lost_messages=sum(each.lost_messages for each in parts),
+        unread_bytes=sum(each.unread_bytes for each in parts),
+        closed=all(each.closed for each in parts),
+        described=_described(source, files, messages),
+    )
 
 
-def _topics(source: pathlib.Path, files: list[_File]) -> dict[str, tuple[Channel, Schema]]:
+def _topics(source: pathlib.Path, files: Iterable[Contents]) -> dict[str, tuple[Channel, Schema]]:
     """Return channel and message type of each topic in all files."""
     topics: dict[str, tuple[Channel, Schema]] = {}
     for file in files:
@@ -193,7 +176,7 @@ def _topics(source: pathlib.Path, files: list[_File]) -> dict[str, tuple[Channel
     return topics
 
 
-def _information(source: pathlib.Path) -> dict[str, Any]:
+def _known(source: pathlib.Path) -> dict[str, Any]:
     """Return the metadata of a bag; empty when it is missing or damaged."""
     try:
         return metadata.read(source)
@@ -201,20 +184,13 @@ def _information(source: pathlib.Path) -> dict[str, Any]:
         return {}
 
 
-def _described(source: pathlib.Path, files: list[_File], messages: int) -> bool:
+def _described(source: pathlib.Path, files: list[pathlib.Path], messages: int) -> bool:
     """Return whether the metadata names these files and this number of messages."""
-    information = _information(source)
-    try:
-        names = {pathlib.PurePath(name).name for name in information['relative_file_paths']}
-    except (KeyError, TypeError):
-        return False
+    known = _known(source)
+    names = known.get('relative_file_paths')
     return (
-        names == {file.path.name for file in files}
-        and information.get('message_count') == messages
+        isinstance(names, list)
+        and sorted(pathlib.PurePath(str(name)).name for name in names)
+        == sorted(file.name for file in files)
+        and known.get('message_count') == messages
     )
-
-
-def _custom_data(source: pathlib.Path) -> dict[str, str]:
-    """Return the custom data of the broken bag, if that can be read."""
-    data = _information(source).get('custom_data')
-    return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}

@@ -129,12 +129,7 @@ LEG_SETPOINT = _of_leg(
     'pressure_setpoint', _FLUID, COMMANDS, ('setpoint',), ('fluid_pressure',), 'Pa absolute',
     'leg_{leg}_pad',
 )  # fmt: skip
-LEG_SLIP = _of_leg('slip', _TWIST, ESTIMATES, ('slip_x', 'slip_y'), _PLANE[:2], 'm/s', 'world')
-LEG_SLIPPING = _number('slipping', 'slipping', 'std_msgs/msg/Bool')
 LEG_WETNESS = _number('wetness', 'wetness')
-LEG_FRICTION = _number('friction', 'friction')
-LEG_MARGIN = _number('friction_margin', 'margin')
-LEG_LOAD = _number('contact_load', 'load', unit='N')
 LEG_DOUBT = Topic(
     'leg_{leg}/doubt', 'std_msgs/msg/String', values=('data',), text=True, record=ESTIMATES
 )
@@ -142,17 +137,22 @@ LEG_MORPHOLOGY = Topic(
     'leg_{leg}/morphology', 'std_msgs/msg/String', values=('data',), text=True, record=COMMANDS
 )
 
-OF_LEGS = (
-    *(LEG_WRENCH, LEG_POSITION, LEG_VELOCITY, LEG_FOOT_WRENCH, LEG_PRESSURE, LEG_SETPOINT),
-    *(LEG_SLIP, LEG_SLIPPING, LEG_WETNESS, LEG_FRICTION, LEG_MARGIN, LEG_LOAD),
-    *(LEG_DOUBT, LEG_MORPHOLOGY),
-)
-"""Topics that each leg has: from drivers of others by ``merge``, for people by ``views``."""
-
 FROM_DRIVERS = (
     *(LEG_WRENCH, LEG_POSITION, LEG_VELOCITY, LEG_FOOT_WRENCH, LEG_PRESSURE, LEG_SETPOINT),
 )
-"""Those of them that become records."""
+"""Topics of a leg that drivers of others publish, and that become records."""
+
+OF_LEGS = (
+    *FROM_DRIVERS,
+    _of_leg('slip', _TWIST, ESTIMATES, ('slip_x', 'slip_y'), _PLANE[:2], 'm/s', 'world'),
+    _number('slipping', 'slipping', 'std_msgs/msg/Bool'),
+    LEG_WETNESS,
+    _number('friction', 'friction'),
+    _number('friction_margin', 'margin'),
+    _number('contact_load', 'load', unit='N'),
+    *(LEG_DOUBT, LEG_MORPHOLOGY),
+)
+"""Topics that each leg has: from drivers of others by ``merge``, for people by ``views``."""
 
 BODY_POSE = Topic(
     'body/pose', 'geometry_msgs/msg/PoseStamped', 'm', 'world',
@@ -180,7 +180,7 @@ RECORDED = (
 """The topics that a robot has only once; they are recorded."""
 
 TRIAL = (
-    *(SAMPLE, ESTIMATE, COMMAND, PRESSURE, BODY_POSE, ODOM, BODY_DOUBT),
+    *(SAMPLE, ESTIMATE, COMMAND, PRESSURE, BODY_POSE, ODOM),
     *(topic for topic in OF_LEGS if topic.columns and topic is not LEG_FOOT_WRENCH),
 )
 """The topics that a trial is read from."""

@@ -119,7 +119,9 @@ class Wire:
             name, or stamps do not advance.
         """
         stamps, values = self._values(data)
-        return Block(np.array(stamps), self._rows(values))
+        numbers = np.full((len(values), len(self._all)), np.nan)
+        numbers[:, self._last.places] = values[:, 1:]
+        return Block(np.array(stamps), numbers.view(self.kind.dtype))
 
     def split(self, data: bytes) -> list[tuple[int, bytes]]:
         """Return the stamp, ns, and the message of each record of a message.
@@ -138,39 +140,6 @@ class Wire:
             (stamp_ns, self._last.message(stamp_ns, row))
             for stamp_ns, row in zip(stamps, values, strict=True)
         ]
-
-    def table(self, messages: Sequence[bytes]) -> Block:
-        """Return the block of all records in many messages in the order of the messages.
-
-        Raises
-        ------
-        BadMessage
-            As for a single message.
-        """
-        if messages:
-            self._values(messages[0])  # of which the others have the names
-            layout = self._last
-            size = layout.start + 8 * len(layout.names) + len(_NOTHING)
-            if all(len(each) == size for each in messages):
-                octets = np.frombuffer(b''.join(messages), np.uint8).reshape(-1, size)
-                names = layout.head + _COUNT.pack(len(layout.names))
-                head = octets[:, _HEAD.size : _HEAD.size + len(names)]
-                if (octets[:, :4] == np.frombuffer(_ENCAPSULATION, np.uint8)).all() and (
-                    head == np.frombuffer(names, np.uint8)
-                ).all():
-                    stamps = octets[:, 4:12].copy().view('<i4').astype(np.int64)
-                    numbers = octets[:, layout.start : -len(_NOTHING)].copy().view('<f8')
-                    return Block(
-                        stamps[:, 0] * 1_000_000_000 + stamps[:, 1].astype(np.uint32),
-                        self._rows(numbers),
-                    )
-        return Block.joined(self.kind, [self.decode(each) for each in messages], len(self.legs))
-
-    def _rows(self, values: np.ndarray) -> np.ndarray:
-        """Return the rows of a table of numbers with their time."""
-        numbers = np.full((len(values), len(self._all)), np.nan)
-        numbers[:, self._last.places] = values[:, 1:]
-        return numbers.view(self.kind.dtype)
 
     def _values(self, data: bytes) -> tuple[list[int], np.ndarray]:
         """Return stamps, ns, and values of a message, whose layout is then the last one."""

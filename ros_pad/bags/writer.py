@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 from ros_pad.bags import metadata
 from ros_pad.bags.codec import definition_of
 from ros_pad.bags.storage import Contents, scan
+from ros_pad.configuration import instance
 from ros_pad.errors import BagError, InvalidInput
 
 CHUNK_SIZE = 192 * 1024
@@ -50,7 +51,7 @@ class BagWriter:
     BagError
         When the folder exists or cannot be created.
     InvalidInput
-        When `custom_data` holds anything but text.
+        When `custom_data` is no mapping.
 
     Attributes
     ----------
@@ -65,7 +66,8 @@ class BagWriter:
     ) -> None:
         self.folder = pathlib.Path(folder)
         self.message_count = 0
-        self._custom_data = metadata.texts(custom_data)
+        instance('custom_data', custom_data or {}, Mapping)
+        self._custom_data = dict(custom_data or {})
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
@@ -79,7 +81,6 @@ class BagWriter:
         self._topics: dict[str, dict[str, Any]] = {}  # entries of metadata.yaml
         self._channels: dict[str, int] = {}  # empty once the bag is closed
         self._schemas: dict[str, int] = {}
-        self._types: dict[str, tuple[str, str]] = {}  # definition and hash
         self._next_flush = 0.0
         self._stream: IO[bytes] | None = None
         # Another thread waits for the disk, so that the caller does not.
@@ -120,9 +121,7 @@ class BagWriter:
         BagError
             When the type is not installed, the topic is there already, or the bag is closed.
         """
-        if type_name not in self._types:
-            self._types[type_name] = definition_of(type_name)
-        definition, known_hash = self._types[type_name]
+        definition, known_hash = definition_of(type_name)
         about = {'offered_qos_profiles': qos, 'topic_type_hash': known_hash}
         self.copy_topic(
             Channel(id=0, topic=name, message_encoding='cdr', metadata=about, schema_id=0),
@@ -207,13 +206,8 @@ class BagWriter:
         ----------
         custom_data : mapping of str to str
             Texts by key, added to the earlier ones.
-
-        Raises
-        ------
-        InvalidInput
-            When `custom_data` holds anything but text.
         """
-        self._custom_data |= metadata.texts(custom_data)
+        self._custom_data |= custom_data
         self._next_flush = 0.0
 
     def flush(self) -> None:
@@ -240,15 +234,10 @@ class BagWriter:
             self._fail(error)
         self._next_flush = time.monotonic() + FLUSH_PERIOD
 
-    def close(self, custom_data: Mapping[str, str] | None = None) -> None:
+    def close(self) -> None:
         """Finish the file and write ``metadata.yaml`` with true counts and times.
 
         A second call does nothing.
-
-        Parameters
-        ----------
-        custom_data : mapping of str to str, optional
-            Added to the earlier custom data.
 
         Raises
         ------
@@ -257,7 +246,6 @@ class BagWriter:
         """
         if self._stream is None:
             return
-        self.describe(custom_data or {})
         try:
             self._writer.finish()
             self._disk.shutdown()

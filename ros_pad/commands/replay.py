@@ -20,13 +20,14 @@ import math
 import pathlib
 from typing import Any
 
+from ros_pad.bags import BagReader
 from ros_pad.commands.command import FILE, FOLDER, Commands, add_command, complain, print_table
 from ros_pad.commands.folder import check_picture, refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.commands.sweep import pairs, typed
 from ros_pad.control import POLICIES
 from ros_pad.errors import BagError
-from ros_pad.trials import Replay, open_bag, replay, replayed_bag
+from ros_pad.trials import Replay, replay, replayed_bag
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.node_settings import NodeSettings
 
@@ -65,8 +66,8 @@ def run(options: argparse.Namespace) -> int:
     check_picture(options.figure)
     refuse_existing('--out', options.out)
     try:
-        with bar('opening', 1.0, 'bag') as show:
-            bag = open_bag(options.bag, show)
+        with bar('opening', 1.0, 'bag', delay=1.0) as show:
+            bag = BagReader(options.bag, show)
         settings = NodeSettings.of(bag).changed(values, options.policy, options.foot)
         with bar('replay', 1.0, 'bag') as show:
             found = replay(bag, settings, options.namespace, remaps, show)
@@ -78,8 +79,7 @@ def run(options: argparse.Namespace) -> int:
 
         write_picture(options.figure, lambda: draw(found))
     if options.out is not None:
-        with bar('writing', 1.0, 'bag') as show:
-            replayed_bag.write(found, options.out, options.namespace, show)
+        replayed_bag.write(found, options.out, options.namespace)
     written = {'figure': options.figure, 'out': options.out}
     paths = {name: path and str(path) for name, path in written.items()}
     if options.json:

@@ -16,10 +16,9 @@ import json
 import os
 import pathlib
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from ros_pad.bags import annotate
 from ros_pad.commands.command import FILE, FOLDER, Commands, add_command, complain, print_table
 from ros_pad.commands.folder import kept_if_filled, new_folder
 from ros_pad.commands.progress import bar
@@ -33,10 +32,9 @@ from ros_pad.signals import INTERRUPTED, STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.robot import check_reach
 from ros_pad.simulation.scene import Scene, is_bench
-from ros_pad.trials import Trial, learnt, loop
+from ros_pad.trials import Metrics, Trial, learnt, loop, others
 from ros_pad.trials import label as labels
 from ros_pad.trials.node_settings import tuning_for
-from ros_pad.trials.others import Others
 from ros_pad.trials.trial import fault_lines
 
 _DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -106,12 +104,15 @@ def run(options: argparse.Namespace) -> int:
     folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}{suffix}')
     policies = () if options.no_compare or policy != 'adaptive' else POLICIES
     compared = [each for each in policies if each != policy]
-    others = Others(scene, compared, options.seed, level, options.sensing, options.tuning)
-    # Real regulators may wait for set-points: nothing else takes their time.
-    beside = contextlib.nullcontext() if options.live else others.beside()
     try:
-        with kept_if_filled(folder), beside:
-            return _walk(others, folder, options, (scene, policy, options.seed, level))
+        # Real regulators may wait for set-points: nothing else takes their time.
+        with (
+            kept_if_filled(folder),
+            others.beside(
+                scene, compared, options.seed, level, options.sensing, options.tuning, options.live
+            ) as compare,
+        ):
+            return _walk(compare, folder, options, (scene, policy, options.seed, level))
     except KeyboardInterrupt:
         bag = folder / 'bag'
         if not bag.exists():
@@ -148,13 +149,13 @@ def _answer(
 
 
 def _walk(
-    others: Others,
+    compare: Callable[[others.Bar], dict[str, Metrics]],
     folder: pathlib.Path,
     options: argparse.Namespace,
     given: tuple[Scene, str, int, str],
 ) -> int:
     """Walk scene, policy, seed and level of ``given``; write report and summary."""
-    scene, policy, *_ = given
+    scene, policy = given[:2]
     bag = None if options.no_ros else folder / 'bag'
     if bag is None:
         with bar(f'{policy}, without ROS', scene.duration) as progress:
@@ -170,17 +171,10 @@ def _walk(
         )
     learnt.save(folder / learnt.FILE, trial.settings['learnt'], scene.foot)
     trial.settings['comparison'] = [
-        {'policy': other, **metrics.as_dict()} for other, metrics in others.metrics(bar).items()
+        {'policy': other, **metrics.as_dict()} for other, metrics in compare(bar).items()
     ]
     if bag is not None:
-        about = labels.label(
-            *given,
-            metrics=trial.metrics,
-            real_time_factor=trial.real_time_factor,
-            comparison=trial.settings['comparison'],
-            sensing=options.sensing,
-        )
-        annotate(bag, about)
+        labels.note(bag, trial)
     page = _write_report(trial, folder / 'report.html')
     summary = _summary(trial, bag, page)
     (folder / 'summary.json').write_text(json.dumps(summary, indent=1), encoding='utf-8')

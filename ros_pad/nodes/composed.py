@@ -27,7 +27,6 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from ros_pad.bags import annotate
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
 from ros_pad.estimation import SETTINGS, Tuning
@@ -44,7 +43,7 @@ from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.label import PARAMETERS, label
+from ros_pad.trials.label import PARAMETERS, label, note
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.metrics import summarise
 from ros_pad.trials.node_settings import body_settings_for, tuning_for
@@ -385,7 +384,6 @@ def run(
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
     controller, shared = trial.walked, trial.estimator.stage.estimator.shared
-    describe = partial(describe, interrupted=trial.stopped)
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()
@@ -394,5 +392,5 @@ def run(
     result.metrics = summarise(scene, result, robot, controller)
     result.real_time_factor = robot.time / wall
     result.settings['learnt'] = settings_of(shared)
-    annotate(bag, describe(metrics=result.metrics, real_time_factor=result.real_time_factor))
+    note(bag, result)
     return result

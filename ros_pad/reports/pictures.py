@@ -89,11 +89,11 @@ def _overview(view: View, window: tuple[float, float]) -> Drawn:
             wet = spans(trial.slow_time, view.wet[:, column])
             ax.broken_barh(wet, (0.0, 1.0), color=WET, linewidth=0.0)
         ax.step(
-            trial.slow_time, trial.wet_probability[:, column], where='post', color=BLUE, lw=0.9
+            trial.slow_time, trial.slow['wetness'][:, column], where='post', color=BLUE, lw=0.9
         )
-        domes = spans(trial.slow_time, trial.pressure[:, column] > DOME_PRESSURE)
+        domes = spans(trial.slow_time, trial.slow['pressure'][:, column] > DOME_PRESSURE)
         ax.broken_barh(domes, (1.10, 0.16), color=VERMILION, linewidth=0.0)
-        alarms = [start for start, _ in spans(trial.slow_time, trial.slipping[:, column])]
+        alarms = [start for start, _ in spans(trial.slow_time, trial.slow['slipping'][:, column])]
         at = np.full(len(alarms), -0.2)
         ax.plot(alarms, at, '|', color=BLACK, markersize=3.5, markeredgewidth=0.6)
         ax.axvspan(*window, facecolor='none', edgecolor=PALE, linestyle=':', linewidth=0.9)
@@ -135,13 +135,14 @@ def _window(view: View, window: tuple[float, float]) -> Drawn:
         for ax in (force, pressure, wetness, slip):
             _shade_stances(ax, view, column, slow)
         force.plot(trial.time[fast], trial.force[fast, column, 2], color=BLUE, linewidth=0.9)
-        measured, wanted = trial.pressure[slow, column], trial.setpoint[slow, column]
-        pressure.plot(time, 1e-3 * measured, color=BLUE, linewidth=1.1)
-        pressure.step(time, 1e-3 * wanted, where='post', color=BLACK, linewidth=0.8, ls='--')
-        wetness.step(time, trial.wet_probability[slow, column], where='post', color=BLUE, lw=1.1)
-        speed = 1e3 * trial.slip_speed[slow, column]
+        known = trial.slow[slow, column]
+        pressure.plot(time, 1e-3 * known['pressure'], color=BLUE, linewidth=1.1)
+        wanted = 1e-3 * known['setpoint']
+        pressure.step(time, wanted, where='post', color=BLACK, linewidth=0.8, ls='--')
+        wetness.step(time, known['wetness'], where='post', color=BLUE, lw=1.1)
+        speed = 1e3 * known['slip_speed']
         slip.plot(time, speed, color=style.GREEN, linewidth=0.9)
-        alarm = trial.slipping[slow, column]
+        alarm = known['slipping']
         slip.plot(time[alarm], speed[alarm], '.', color=VERMILION, markersize=2.5)
         force.set_ylabel(f'leg {trial.legs[column]}', fontweight='bold')
     # Show at least this range, so that noise alone does not fill the axes.

@@ -100,10 +100,8 @@ def unobservable_shares(trial: Trial, load_gate: float) -> str:
 
     A foot stands with more than ``load_gate`` newtons. Empty where no doubts are on record.
     """
-    if not len(trial.doubt):
-        return ''
     ends = [
-        trial.doubt[np.maximum(rows - 1, 0), column]
+        trial.slow['doubt'][np.maximum(rows - 1, 0), column]
         for column, rows in enumerate(stance_ends(trial, load_gate))
     ]
     stances = Counter(np.concatenate(ends).tolist())
@@ -224,7 +222,8 @@ def write(
         parts.append(f'<h2>Where the ground was observable</h2><p>{html.escape(words)}</p>')
     parts += [
         '<h2>What the model has and leaves out</h2>' + note + _terms_table(trial.settings),
-        '<h2>Conditions</h2>' + plain_table(conditions.rows(trial)),
+        '<h2>Conditions</h2><p>In SI units; pressures gauge.</p>',
+        plain_table(conditions.rows(trial)),
     ]
     save(path, page(f'{name}: ros_pad', parts).encode())
 

@@ -89,7 +89,7 @@ def window_of(view: View) -> tuple[float, float]:
     """
     trial = view.trial
     first, last = float(trial.slow_time[0]), float(trial.slow_time[-1])
-    changed = [trial.dome] if view.wet is None else [trial.dome, view.wet]
+    changed = [trial.slow['dome']] if view.wet is None else [trial.slow['dome'], view.wet]
     changes = np.concatenate([~each[:-1] & each[1:] for each in changed], axis=1).any(axis=1)
     moments = trial.slow_time[1:][changes]
     middle = float(np.median(moments)) if len(moments) else 0.5 * (first + last)

@@ -3,7 +3,7 @@
 
 from ros_pad.trials.loop import run
 from ros_pad.trials.node_settings import NodeSettings
-from ros_pad.trials.replay import Outcome, Replay, open_bag, replay
+from ros_pad.trials.replay import Outcome, Replay, replay
 from ros_pad.trials.trial import Metrics, Trial
 
 __all__ = [
@@ -12,7 +12,6 @@ __all__ = [
     'Outcome',
     'Replay',
     'Trial',
-    'open_bag',
     'replay',
     'run',
 ]

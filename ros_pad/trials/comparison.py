@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.records import Block, Field, Kind
+from ros_pad.records import Block, Kind
 
 ROUNDING = 1e-12
 """Largest difference that counts as rounding, relative to the recorded number (below 1: to 1).
@@ -72,6 +73,14 @@ class Stream(NamedTuple):
         stamps, rows = self.block
         return self._replace(times=self.times[kept], block=Block(stamps[kept], rows[kept]))
 
+    def of_legs(self, legs: Sequence[int]) -> Stream:
+        """Return the records of these legs; those of other legs are missing."""
+        rows = self.kind.rows(len(self.times), len(legs))
+        for place, leg in enumerate(legs):
+            if leg in self.legs:
+                rows[:, place] = self.block.rows[:, self.legs.index(leg)]
+        return self._replace(legs=tuple(legs), block=Block(self.block.stamps, rows))
+
     def values(self, name: str) -> np.ndarray:
         """Return the values of a field, (n, legs, components)."""
         values: np.ndarray = self.block.rows[name]
@@ -80,17 +89,12 @@ class Stream(NamedTuple):
     def tracks(self) -> dict[tuple[int, str], Track]:
         """Return the values of each quantity, by leg and name."""
         return {
-            (leg, quantity(field)): Track(
+            (leg, field.name): Track(
                 self.times, self.block.stamps, self.values(field.name)[:, place]
             )
             for place, leg in enumerate(self.legs)
             for field in self.kind.fields
         }
-
-
-def quantity(field: Field) -> str:
-    """Return the name of what a field is, for people: that of the field, or ``morphology``."""
-    return 'morphology' if field.name == 'dome' else field.name
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,7 @@ def compare(
     found = []
     for leg in recorded.legs:
         for field in recorded.kind.fields:
-            key = leg, quantity(field)
+            key = leg, field.name
             apart, far = _apart(before[key].values[own], after[key].values[theirs])
             parting = np.concatenate([recorded.times[own][apart > 0.0], lost])
             grave = np.concatenate([recorded.times[own][far], lost])
@@ -174,7 +178,7 @@ def compare(
                 Comparison(
                     topic=topic,
                     leg=leg,
-                    quantity=quantity(field),
+                    quantity=field.name,
                     unit=field.unit,
                     compared=len(own),
                     equal=int(np.sum(apart == 0.0)),

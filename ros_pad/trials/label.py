@@ -11,13 +11,12 @@ import os
 import pathlib
 import platform
 import subprocess
-from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import metadata
 from typing import Any
 
 import ros_pad
-from ros_pad.bags import BagReader
+from ros_pad.bags import BagReader, annotate
 from ros_pad.configuration import Setting
 from ros_pad.errors import BagError
 from ros_pad.simulation import fidelity as levels
@@ -55,48 +54,37 @@ def label(
     policy: str,
     seed: int,
     fidelity: str,
-    *,
-    interrupted: bool = False,
-    metrics: Metrics | None = None,
-    real_time_factor: float | None = None,
-    comparison: Sequence[dict[str, Any]] = (),
     sensing: str = 'markers',
+    interrupted: bool = False,
 ) -> dict[str, str]:
-    """Return the custom data of a trial's bag: JSON texts by key.
+    """Return the custom data of a trial's bag, which :func:`note` completes: texts by key.
 
     Parameters
     ----------
-    scene, policy, seed, fidelity
-        The conditions of the trial.
+    scene, policy, seed, fidelity, sensing
+        The conditions of the trial; ``sensing`` is ``markers`` or ``joints``.
     interrupted : bool
         Whether the trial was stopped before its end.
-    metrics, real_time_factor
-        Results of the trial; None before its end.
-    comparison : sequence of dict
-        Metrics of other policies on the same ground, each with its ``policy``.
-    sensing : str
-        ``markers`` or ``joints``.
     """
-    return {
-        KEY: json.dumps(
-            {
-                'scene': scene.source,
-                'policy': policy,
-                'seed': seed,
-                'fidelity': fidelity,
-                'floor': asdict(scene.floor),
-                'ambient_pressure': AMBIENT_PRESSURE.default,
-                'metrics': metrics.as_dict() if metrics else None,
-                'real_time_factor': real_time_factor,
-                'settings': settings(scene, policy, fidelity, sensing)
-                | {
-                    'interrupted': interrupted,
-                    'comparison': list(comparison),
-                },
-            }
-        ),
-        MADE_WITH: json.dumps(made_with()),
+    known = {
+        'scene': scene.source,
+        'policy': policy,
+        'seed': seed,
+        'fidelity': fidelity,
+        'floor': asdict(scene.floor),
+        'ambient_pressure': AMBIENT_PRESSURE.default,
+        'settings': settings(scene, policy, fidelity, sensing) | {'interrupted': interrupted},
     }
+    return {KEY: json.dumps(known), MADE_WITH: json.dumps(made_with())}
+
+
+def note(folder: str | os.PathLike[str], trial: Trial) -> None:
+    """Add the results of a trial, and the metrics of other policies, to its closed bag."""
+    known = json.loads(BagReader(folder).custom_data[KEY])
+    known['metrics'] = trial.metrics.as_dict() if trial.metrics else None
+    known['real_time_factor'] = trial.real_time_factor
+    known['settings']['comparison'] = trial.settings['comparison']
+    annotate(folder, {KEY: json.dumps(known)})
 
 
 def read(bag: BagReader) -> dict[str, Any]:
@@ -134,11 +122,12 @@ def made_with() -> dict[str, str]:
     The key ``git``, the description of the commit, exists only in a checkout of the repository.
     """
     versions = {'ros_pad': ros_pad.__version__}
-    folder = pathlib.Path(ros_pad.__file__).parent
-    # In a venv inside another repository, git would describe that repository.
-    ours = _git(folder, 'ls-files', '--error-unmatch', '__init__.py')
-    if ours and (description := _git(folder, 'describe', '--always', '--dirty', '--tags')):
-        versions['git'] = description
+    folder = pathlib.Path(ros_pad.__file__).parent.parent
+    if (folder / '.git').exists():
+        with contextlib.suppress(OSError, subprocess.SubprocessError):
+            words = ['git', '-C', str(folder), 'describe', '--always', '--dirty', '--tags']
+            said = subprocess.run(words, capture_output=True, text=True, timeout=5.0, check=True)
+            versions['git'] = said.stdout.strip()
     versions['python'] = platform.python_version()
     for package in ('numpy', 'scipy', 'mujoco', 'mcap'):
         with contextlib.suppress(metadata.PackageNotFoundError):
@@ -146,16 +135,6 @@ def made_with() -> dict[str, str]:
     if distro := os.environ.get('ROS_DISTRO'):
         versions['ros'] = distro
     return versions | {'system': f'{platform.system()} {platform.machine()}'}
-
-
-def _git(folder: pathlib.Path, *words: str) -> str:
-    """Return the output of git in a folder; empty where git fails or is not installed."""
-    with contextlib.suppress(OSError, subprocess.SubprocessError):
-        return subprocess.run(
-            ['git', '-C', str(folder), *words],
-            capture_output=True, text=True, timeout=5.0, check=True,
-        ).stdout.strip()  # fmt: skip
-    return ''
 
 
 def promise(trial: Trial) -> str:
@@ -182,6 +161,7 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
         'fidelity_note': choice.note,
         'omitted': [each for each in known if not each['taken']],
         'taken': [each for each in known if each['taken']],
+        'comparison': [],
         'version': ros_pad.__version__,
         'versions': made_with(),
         'conditions': described(scene),
@@ -191,10 +171,8 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
 def described(scene: Scene) -> dict[str, Any]:
     """Return a scene as plain values for JSON, nested like its YAML, in SI units."""
     values: dict[str, Any] = asdict(scene)
-    # Leave out the tables of a foot, which are computed from its other values.
-    values['foot'] = {
-        name: each for name, each in values['foot'].items() if not name.startswith('_')
-    }
+    # The tables of a foot are computed from its other values.
+    values['foot'] = {n: value for n, value in values['foot'].items() if n[0] != '_'}
     values['body'].pop('robot', None)  # its file is named
     values['faults'] = [str(fault) for fault in scene.faults]
     return values

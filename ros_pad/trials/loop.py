@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,6 @@ from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace, Progress
 from ros_pad.pipeline import Pipeline
-from ros_pad.records import SAMPLE, Block
 from ros_pad.regulators import Regulator, create
 from ros_pad.regulators.channel import DEFAULTS as SUPERVISION
 from ros_pad.regulators.channel import SupervisedChannel
@@ -34,13 +34,15 @@ from ros_pad.sensing.stage import estimator_of, sample_of
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.sensors import BodySensors, Sensors
 from ros_pad.simulation.terms import with_terms
+from ros_pad.trials.label import settings
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.log import TrialLog
+from ros_pad.trials.metrics import summarise
 from ros_pad.trials.node_settings import body_settings_for, tuning_for
+from ros_pad.trials.series import trial_of
 from ros_pad.trials.trial import Trial, heading
 
 
@@ -123,8 +125,8 @@ class ClosedLoop:
     pipeline : Pipeline
         Estimation and decision; see :meth:`connect`.
     supervision : Supervision
-    level : str
-        Fidelity level.
+    log : TrialLog
+        Records until now.
     pads : list of float
         True gauge pressures of the pads at the last control step, Pa.
 
@@ -147,10 +149,17 @@ class ClosedLoop:
         sensing: str = 'markers',
     ) -> None:
         choice('sensing', sensing, SOURCES)
-        self.level = levels.level(scene, fidelity, policy, sensing == 'joints')
+        level = levels.level(scene, fidelity, policy, sensing == 'joints')
+        self._scene, self._tuning = scene, tuning or tuning_for(scene, sensing)
+        self._about: dict[str, Any] = {
+            'policy': policy,
+            'seed': integer('seed', seed),
+            'fidelity': level,
+        }
+        self.log = TrialLog(len(scene.legs))
         self.period_ns = round(1e9 / scene.sensors.rate)
-        self.floor = scene.floor.build(integer('seed', seed))
-        self.robot = levels.build(with_terms(scene), self.floor, self.period_ns * 1e-9, self.level)
+        self.floor = scene.floor.build(seed)
+        self.robot = levels.build(with_terms(scene), self.floor, self.period_ns * 1e-9, level)
         self.sensors = Sensors.of(scene, seed)
         self._stamp_ns = 0
         self.body: BodySensing | None = None
@@ -171,8 +180,6 @@ class ClosedLoop:
         self.supervision.activate(0)
         self.pads = [0.0] * len(scene.legs)
         self._tick_pace = Pace(TICK_PERIOD_NS)
-        self._scene, self._tuning = scene, tuning or tuning_for(scene, sensing)
-        self._block: list[tuple[int, np.ndarray | None, Vector, Vector]] = []
         self.connect(
             MorphologyController(
                 scene.foot,
@@ -224,7 +231,7 @@ class ClosedLoop:
         """What decides for all legs."""
         return self.pipeline.decision.controller
 
-    def tick(self, log: TrialLog) -> None:
+    def tick(self) -> None:
         """Advance by one sample; at control moments, process the samples since the last one."""
         self._stamp_ns += self.period_ns
         self.robot.step(self.pads)
@@ -232,11 +239,11 @@ class ClosedLoop:
             rows, odom = self.body.sample(self._stamp_ns), self.body.odom
         else:
             rows, odom = self.sensors.sample(self.robot), (math.nan,) * 3
-        self._block.append((self._stamp_ns, rows, self.robot.body, odom))
+        self.log.sample(self._stamp_ns, rows, self.robot.body, odom)
         if self._pace.due(self._stamp_ns):
-            self._process(log)
+            self._process()
 
-    def _process(self, log: TrialLog) -> None:
+    def _process(self) -> None:
         """Process the samples since the last control moment."""
         now_ns = self._stamp_ns
         self.supervision.tick(now_ns)
@@ -244,32 +251,42 @@ class ClosedLoop:
             if self.body:
                 self.body.stage.tick(now_ns)
             self.pipeline.tick(now_ns)
-        block = self._samples(log)
-        for estimate, command in self.pipeline.process(block):
+        for estimate, command in self.pipeline.process(self.log.take(now_ns)):
             pressure = self.supervision.read(now_ns, now_ns)
             self.supervision.command(command, now_ns, now_ns)
             self.pipeline.pressure(pressure)
             self.pads = pressure.rows[0]['pad'].tolist()
-            log.control(estimate, command, pressure)
+            self.log.control(estimate, command, pressure)
 
-    def _samples(self, log: TrialLog) -> Block:
-        """Return the collected samples, and log them; a control moment without one has NaN."""
-        *rest, last = self._block
-        self._block = []
-        if last[1] is None:
-            last = (last[0], SAMPLE.rows(len(self._scene.legs)), *last[2:])
-        stamps, rows, body, odom = zip(
-            *(each for each in rest if each[1] is not None), last, strict=True
+    def walk(self) -> Generator[None, None, None]:
+        """Yield after each sample, until the scene ends or a verdict ends it; close the loop."""
+        try:
+            for _ in range(round(self._scene.duration * 1e9) // self.period_ns):
+                self.tick()
+                yield
+                if self.robot.verdict:
+                    break
+        finally:
+            self.close()
+
+    def trial(self, real_time_factor: float | None = None) -> Trial:
+        """Return the trial until now, with its series, settings and metrics."""
+        scene, (body, odom) = self._scene, self.log.poses
+        sensing = 'joints' if self.body else 'markers'
+        trial = trial_of(
+            self.log.records,
+            scene.legs,
+            body,
+            odom if self.body else None,
+            **self._about,
+            scene=scene.name,
+            floor=self.floor,
+            settings=settings(scene, self._about['policy'], self._about['fidelity'], sensing),
+            real_time_factor=real_time_factor,
         )
-        numbers = np.stack([each.view('f8') for each in rows])
-        block = Block(np.array(stamps), numbers.view(SAMPLE.dtype))
-        log.samples(block, body, odom if self.body else None)
-        return block
-
-    def finish(self, log: TrialLog) -> None:
-        """Log the samples since the last control moment, which nobody processes."""
-        if self._block:
-            self._samples(log)
+        trial.metrics = summarise(scene, trial, self.robot, self.controller)
+        trial.settings['learnt'] = settings_of(self.pipeline.estimation.estimator.shared)
+        return trial
 
     def close(self) -> None:
         """Vent and close the regulators."""
@@ -336,20 +353,9 @@ def run(
     if tuning is not None:
         instance('tuning', tuning, Tuning)
     loop = ClosedLoop(scene, policy, seed, fidelity, tuning, policy_parameters, sensing)
-    log = TrialLog(scene, policy, seed, loop.level, sensing)
     started = time.perf_counter()
-    samples = round(scene.duration * 1e9) // loop.period_ns
-    try:
-        for sample in range(samples):
-            loop.tick(log)
+    with closing(loop.walk()) as samples:
+        for sample, _ in enumerate(samples):
             if progress and sample % 250 == 0:
                 progress(loop.robot.time)
-            if loop.robot.verdict:
-                break
-        loop.finish(log)
-    finally:
-        loop.close()
-    wall = time.perf_counter() - started
-    trial = log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
-    trial.settings['learnt'] = settings_of(loop.pipeline.estimation.estimator.shared)
-    return trial
+    return loop.trial(loop.robot.time / (time.perf_counter() - started))

@@ -83,8 +83,8 @@ def wet_accuracy(trial: Trial, load_gate: float) -> float | None:
     wet = trial.wet()
     right = total = 0
     for column, rows in enumerate(stance_ends(trial, load_gate)):
-        flat = rows[trial.pressure[np.maximum(rows - 1, 0), column] < DOME_PRESSURE]
+        flat = rows[trial.slow['pressure'][np.maximum(rows - 1, 0), column] < DOME_PRESSURE]
         total += len(flat)
         before = np.maximum(flat - 1, 0)
-        right += int(np.sum((trial.wet_probability[flat, column] > 0.5) == wet[before, column]))
+        right += int(np.sum((trial.slow['wetness'][flat, column] > 0.5) == wet[before, column]))
     return right / total if total else None

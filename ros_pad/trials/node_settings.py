@@ -6,7 +6,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -16,7 +17,7 @@ from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphol
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
 from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.errors import BagError, InvalidInput, LimitError, reason
+from ros_pad.errors import BagError, ConfigError, InvalidInput, LimitError, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
@@ -48,6 +49,18 @@ SHAKING = 0.3
 shorter. Where all feet slip, the body estimator must not rely on the IMU more than that."""
 
 Value: TypeAlias = 'float | int | bool | str'
+
+
+@contextmanager
+def errors_naming(values: Mapping[str, Value]) -> Iterator[None]:
+    """Put changed parameters before the message of an error that comes from them."""
+    try:
+        yield
+    except (ConfigError, InvalidInput) as error:
+        if not values:
+            raise
+        given = ', '.join(f'{name}={value}' for name, value in values.items())
+        raise type(error)(f'{given}: {error}') from error
 
 
 def body_settings_for(scene: Scene) -> dict[str, Any]:
@@ -186,7 +199,7 @@ class NodeSettings:
         values = dict(values or {})
         for name in values:
             choice('parameter', name, tuple(KNOWN))
-        try:
+        with errors_naming(values):
             settings = replace(
                 self,
                 foot=self.foot if foot is None else Foot.load(foot),
@@ -195,10 +208,10 @@ class NodeSettings:
             )
             if of_policy := _of_policy(values):
                 policy_named(settings.policy, parameters=of_policy)  # raises unless it is adaptive
-            settings.controller(settings.legs or (1,))
-        except (InvalidInput, LimitError) as error:
-            given = ', '.join(f'{name}={value}' for name, value in values.items())
-            raise InvalidInput(f'{given}: {error}' if given else str(error)) from error
+            try:
+                settings.controller(settings.legs or (1,))
+            except LimitError as error:
+                raise InvalidInput(str(error)) from error
         return settings
 
     def as_dict(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from functools import partial
 from typing import TypeAlias
 
@@ -25,54 +25,38 @@ Bar: TypeAlias = 'Callable[[str, float], AbstractContextManager[Progress]]'
 """Shows the progress of a text up to a total."""
 
 
-class Others:
-    """Walks that may be under way in other processes."""
+@contextmanager
+def beside(
+    scene: Scene,
+    policies: Sequence[str],
+    seed: int,
+    level: str,
+    sensing: str,
+    tuning: Tuning | None,
+    alone: bool = False,
+) -> Iterator[Callable[[Bar], dict[str, Metrics]]]:
+    """Walk in other processes until the block ends, unless the scene is short, or ``alone``.
 
-    def __init__(
-        self,
-        scene: Scene,
-        policies: Sequence[str],
-        seed: int,
-        level: str,
-        sensing: str = 'markers',
-        tuning: Tuning | None = None,
-    ) -> None:
-        self._duration, self._policies = scene.duration, policies
-        self._run = partial(
-            loop.run, scene, seed=seed, fidelity=level, tuning=tuning, sensing=sensing
-        )
-        self._walks: dict[str, Future[Trial]] = {}
+    Yield a function that returns the metrics by policy; what no process walks is walked by it.
+    """
+    run = partial(loop.run, scene, seed=seed, fidelity=level, tuning=tuning, sensing=sensing)
+    walks: dict[str, Future[Trial]] = {}
 
-    @contextmanager
-    def beside(self) -> Iterator[Others]:
-        """Walk in other processes as far as there are cores, until the block ends."""
-        free = min(workers.cores() - 1, len(self._policies))
-        if free < 1 or self._duration < SHORTEST:
-            yield self
-            return
-        with workers.pool(free, os.nice, 5) as executor:  # behind the trial itself
-            for policy in self._policies:
-                self._walks[policy] = executor.submit(self._run, policy=policy)
-            yield self
-
-    def metrics(self, bar: Bar) -> dict[str, Metrics]:
-        """Return the metrics of the walks by policy; what has not begun is walked here.
-
-        Raises
-        ------
-        PadError
-            As :func:`ros_pad.trials.loop.run`.
-        """
-        # From the last on: the others begin with the first.
-        trials = {policy: self._of(policy, bar) for policy in reversed(self._policies)}
-        found = {policy: trials[policy].metrics for policy in self._policies}
-        return {policy: each for policy, each in found.items() if each is not None}
-
-    def _of(self, policy: str, bar: Bar) -> Trial:
-        walk = self._walks.get(policy)
-        with bar(f'{policy:8} on the same ground', self._duration) as progress:
-            # A cancelled walk would let the others wait for ever if a process is killed.
-            if walk and (walk.running() or walk.done()):
+    def metrics(bar: Bar) -> dict[str, Metrics]:
+        found = {}
+        for policy in policies:
+            with bar(f'{policy:8} on the same ground', scene.duration) as progress:
+                trial = None
                 with suppress(BrokenProcessPool):  # killed, possibly for lack of memory
-                    return walk.result()
-            return self._run(policy=policy, progress=progress)
+                    trial = walks[policy].result() if policy in walks else None
+                trial = trial or run(policy=policy, progress=progress)
+            if trial.metrics:
+                found[policy] = trial.metrics
+        return found
+
+    with ExitStack() as stack:
+        if policies and not alone and scene.duration >= SHORTEST:
+            count = min(workers.cores(), len(policies))
+            pool = stack.enter_context(workers.pool(count, os.nice, 5))  # behind the trial itself
+            walks |= {policy: pool.submit(run, policy=policy) for policy in policies}
+        yield metrics

@@ -12,11 +12,13 @@ from __future__ import annotations
 import contextlib
 import datetime
 import json
+import math
+import operator
 import os
 import pathlib
 import re
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,14 +28,20 @@ from ros_pad.bags.recovery import KEY as REPAIR
 from ros_pad.bags.topics import BODY_POSE, DIAGNOSTICS, ODOM, STAMP, TRIAL, Topic, to_record
 from ros_pad.configuration import choice
 from ros_pad.errors import BagError, InvalidInput
+from ros_pad.joining import Joiner
 from ros_pad.pace import LATE, Progress, part
-from ros_pad.records import KINDS, Block, Kind
+from ros_pad.records import KINDS, Kind
 from ros_pad.trials import label
 from ros_pad.trials.comparison import Stream
-from ros_pad.trials.series import by_row, held, series
+from ros_pad.trials.series import Poses, Records, by_row, trial_of
 from ros_pad.trials.trial import Trial, heading
 
+NEEDED = ('force', 'position', 'velocity')
+"""Fields for which a record of samples waits, if anybody publishes them."""
+
+_Piece: TypeAlias = tuple[int, int, int, dict[str, float]]
 _KNOWN = {topic.pattern: topic for topic in TRIAL}
+_NAME = r'(.*?/)(?:leg_(\d+)/)?((?:feet/|body/)?[^/]*)'  # namespace, leg, topic
 _FIRST_DATE_NS = 10**18  # a log time after 2001 is a date, an earlier one is simulated time
 
 
@@ -102,36 +110,23 @@ def load(
         settings['late'] = late(bag, part(progress, 0.8, 1.0))
     if progress:
         progress(1.0)
-    found = series(*(recording.streams[kind.name].block for kind in KINDS))
-    body, odom = (_poses(recording, topic, found['time']) for topic in (BODY_POSE, ODOM))
-    if body is None:
-        body = np.full((len(found['time']), 3), np.nan) if odom is None else odom
+    body, odom = (_poses(recording, topic) for topic in (BODY_POSE, ODOM))
     zero_ns = 0
     if bag.start > _FIRST_DATE_NS:
         zero_ns = bag.start
         moment = datetime.datetime.fromtimestamp(bag.start // 10**9, datetime.UTC)
         settings['recorded'] = f'{moment:%Y-%m-%d %H:%M:%S} UTC'
-    found |= {name: (found[name] - zero_ns) * 1e-9 for name in ('time', 'slow_time')}
     about['scene'] = pathlib.PurePath(about['scene']).stem
-    trial = Trial(
-        **about,
-        **found,
-        legs=recording.legs,
-        body=body,
-        odom=np.zeros((0, 3)) if odom is None else odom,
-    )
-    if odom is not None:
-        trial.move_to_world()
-    return trial
+    records = Records(*(recording.streams[kind.name].block for kind in KINDS))
+    return trial_of(records, recording.legs, body, odom, zero_ns, **about)
 
 
-def _poses(recording: Recording, topic: Topic, grid: np.ndarray) -> np.ndarray | None:
-    """Return x and y, m, and heading, rad, at times, ns, (n, 3); None if they are not recorded."""
+def _poses(recording: Recording, topic: Topic) -> Poses | None:
+    """Return what was recorded of x and y, m, and heading, rad; None if nothing was."""
     if topic not in recording.poses:
         return None
     stamps, _, values = _stamped(*recording.poses[topic])
-    poses = np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
-    return held(stamps, poses, grid)
+    return stamps, np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
 
 
 def _stamped(times: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -185,47 +180,44 @@ def read(
         if topic.columns or topic in (BODY_POSE, ODOM)
     }
     records, tables = bag.read(kinds, paths, progress)
-    parts: dict[str, list[Stream]] = {kind.name: [] for kind in KINDS}
-    for name, (own, times, block) in records.items():
-        parts[kinds[name].name].append(Stream(kinds[name], own, times, block))
+    streams = {}
+    for name, own in records.items():
+        stream = Stream(kinds[name], *own)
+        streams[stream.kind.name] = stream.where(np.argsort(stream.block.stamps, kind='stable'))
+    pieces: dict[Kind, list[_Piece]] = {}
     for name, table in tables.items():
         topic, leg = wanted[name]
         if topic.record and leg is not None:
-            parts[topic.record.name].append(_of_leg(topic, leg, table, ambient))
-    legs = tuple(sorted({leg for each in parts.values() for one in each for leg in one.legs}))
+            pieces.setdefault(topic.record, []).extend(_pieces(topic, leg, table, ambient))
+    legs = {leg for each in streams.values() for leg in each.legs}
+    legs |= {leg for each in pieces.values() for _, leg, _, _ in each}
+    for kind in KINDS:
+        streams.setdefault(kind.name, _joined(kind, sorted(legs), pieces.get(kind, [])))
     return Recording(
-        legs,
-        {kind.name: _gathered(kind, legs, parts[kind.name]) for kind in KINDS},
+        tuple(sorted(legs)),
+        {name: each.of_legs(sorted(legs)) for name, each in streams.items()},
         {kind.name: name for name, kind in kinds.items()},
         {wanted[name][0]: table for name, table in tables.items()},
     )
 
 
-def _of_leg(topic: Topic, leg: int, table: Table, ambient: float) -> Stream:
-    """Return the records that the messages of a leg are."""
-    assert topic.record
-    times, values = table
-    stamps = times
-    if topic.frame:
-        stamps, times, values = _stamped(*table)
-    rows = topic.record.rows(len(stamps), 1)
-    numbers = rows.view('f8').reshape(len(stamps), -1)
-    places = [topic.record.columns.index(column) for column in topic.columns]
-    numbers[:, places] = to_record(topic, values, ambient)
-    return Stream(topic.record, (leg,), times, Block(stamps, rows))
+def _pieces(topic: Topic, leg: int, table: Table, ambient: float) -> Iterator[_Piece]:
+    """Yield log time, ns, leg, stamp, ns, and numbers by column of the messages of a leg."""
+    stamps, times, values = _stamped(*table) if topic.frame else (table[0], *table)
+    numbers = to_record(topic, values, ambient).tolist()
+    for time_ns, stamp_ns, own in zip(times.tolist(), stamps.tolist(), numbers, strict=True):
+        yield time_ns, leg, stamp_ns, dict(zip(topic.columns, own, strict=True))
 
 
-def _gathered(kind: Kind, legs: tuple[int, ...], parts: Sequence[Stream]) -> Stream:
-    """Return the records of several sources as those of all legs."""
-    rows = [kind.rows(0, len(legs))]
-    for each in parts:
-        rows.append(kind.rows(len(each.times), len(legs)))
-        rows[-1][:, [legs.index(leg) for leg in each.legs]] = each.block.rows
-    none = np.empty(0, np.int64)
-    stamps = np.concatenate([none, *(each.block.stamps for each in parts)])
-    times = np.concatenate([none, *(each.times for each in parts)])
-    order = np.argsort(stamps, kind='stable')
-    return Stream(kind, legs, times, Block(stamps, np.concatenate(rows))).where(order)
+def _joined(kind: Kind, legs: Sequence[int], pieces: list[_Piece]) -> Stream:
+    """Return records of all legs, with the log time of the last piece of each."""
+    there = {column for _, _, _, values in pieces for column in values}
+    needed = [name for name in NEEDED if there & {f'{name}_{axis}' for axis in 'xyz'}]
+    joiner, found, time_ns = Joiner(kind, legs, needed), [], 0
+    for time_ns, leg, stamp_ns, values in sorted(pieces, key=operator.itemgetter(0)):
+        found += [(time_ns, block) for block in joiner.add(leg, stamp_ns, values)]
+    found += [(time_ns, block) for block in joiner.expire(math.inf)]
+    return Stream.of(kind, tuple(legs), found)
 
 
 def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
@@ -236,7 +228,7 @@ def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
     if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
         return []
     found: dict[str, list[tuple[float, str]]] = {}
-    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], LATE.encode(), progress):
+    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], progress):
         for status in array.status:
             if status.message.startswith(LATE):
                 seconds = (log_ns - bag.start) * 1e-9
@@ -257,18 +249,15 @@ def _wanted(
     names = [*renamed.items(), *((topic, topic) for topic in bag.topics if topic not in there)]
     robots: dict[str, dict[str, tuple[Topic, int | None]]] = {}
     for full, name in names:
-        match = re.fullmatch(r'(.*/)leg_(\d+)(/\w+)', full)
-        own = next((each for each in _KNOWN if full.endswith(f'/{each}')), '')
-        own = f'leg_{{leg}}{match[3]}' if match else own
-        if own not in _KNOWN or not bag.counts[name]:
+        space, leg, own = re.fullmatch(_NAME, full).groups()  # type: ignore[union-attr]
+        topic = _KNOWN.get(f'leg_{{leg}}/{own}' if leg else own)
+        if topic is None or not bag.counts[name]:
             continue
-        topic = _KNOWN[own]
         if bag.topics[name] != topic.type_name:
             raise BagError(
                 f'{bag.path}: {name} is a {bag.topics[name]}: {topic.type_name} is needed'
             )
-        robot = robots.setdefault(match[1] if match else full.removesuffix(own), {})
-        robot[name] = topic, int(match[2]) if match else None
+        robots.setdefault(space, {})[name] = topic, int(leg) if leg else None
     robots = {
         each: own for each, own in robots.items() if any(topic.record for topic, _ in own.values())
     }

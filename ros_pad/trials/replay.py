@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import json
 import math
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -24,7 +23,6 @@ from ros_pad.bags import BagReader
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.estimation.stage import EstimationStage
-from ros_pad.joining import Joiner
 from ros_pad.pace import TICK_PERIOD_NS, Pace, Progress, part
 from ros_pad.pipeline import Pipeline
 from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind
@@ -33,7 +31,7 @@ from ros_pad.trials.label import CHANGES
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import Recording, read
 from ros_pad.trials.replay_body import compare_body
-from ros_pad.trials.trial import BOUNCE
+from ros_pad.trials.trial import standing
 
 LONGER = 1.6
 """A time between two messages that is longer than their median time by this factor is a gap."""
@@ -88,8 +86,8 @@ class Replay:
         Number of rejected samples, and the reason of the last one, by leg.
     recorded : dict
         A :class:`Track` by leg and quantity, such as ``wetness`` or ``setpoint``, as recorded; the
-        quantities are the fields of :data:`ros_pad.records.ESTIMATE` and, of the command,
-        ``setpoint`` and ``morphology`` (1 dome, 0 flat).
+        quantities are the fields of :data:`ros_pad.records.ESTIMATE` and
+        :data:`ros_pad.records.COMMAND`.
     replayed : dict
         The same, as replayed.
     streams : dict of Stream
@@ -153,29 +151,6 @@ class Replay:
         }
 
 
-def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> BagReader:
-    """Open a bag.
-
-    Parameters
-    ----------
-    path : str or path
-        Folder of a bag, or one of its files.
-    progress : callable, optional
-        Called with the share of the bag that is read, 0 to 1.
-
-    Returns
-    -------
-    BagReader
-        The open bag.
-
-    Raises
-    ------
-    BagError
-        When :class:`ros_pad.bags.BagReader` raises it.
-    """
-    return BagReader(path, progress)
-
-
 def replay(
     bag: BagReader,
     settings: NodeSettings | None = None,
@@ -217,7 +192,7 @@ def replay(
         bag, settings.values['ambient_pressure'], namespace, remaps, part(progress, 0.0, 0.2)
     )
     inputs = _inputs(bag, recording, settings)
-    player = _Player(settings, inputs)
+    player = _Player(settings, inputs.streams)
     made = player.play(part(progress, 0.2, 0.9))
     comparisons = [
         found
@@ -227,7 +202,6 @@ def replay(
             recording.topics[kind], inputs.streams[kind], made[kind], bag.start, inputs.gap_ns
         )
     ]
-    gaps = inputs.gaps if any(each.verdict == 'gap' for each in comparisons) else []
     # The body estimator is replayed beside the feet, which take what it published.
     of_body, note = compare_body(bag, recording.topics.get(SAMPLE.name, ''))
     recorded, replayed = (
@@ -236,26 +210,27 @@ def replay(
     )
     if progress:
         progress(1.0)
+    rejected = [
+        f'leg {leg}: {count} samples rejected, the last one: {reason}'
+        for leg, (count, reason) in player.refused.items()
+    ]
+    notes = [*settings.assumed, *_changes(bag), *inputs.notes, *rejected, bag.problem, note]
+    legs = made[ESTIMATE.name].legs
     return Replay(
         bag=str(bag.path),
         settings=settings,
-        legs=inputs.legs,
+        legs=legs,
         start_ns=bag.start,
         duration_s=(bag.end - bag.start) * 1e-9,
-        samples=dict(zip(inputs.legs, player.stages.estimation.used.tolist(), strict=True)),
+        samples=dict(zip(legs, player.stages.estimation.used.tolist(), strict=True)),
         refused=player.refused,
         recorded=recorded,
         replayed=replayed,
         streams=made,
         comparisons=comparisons + of_body,
-        outcomes=list(_outcomes(inputs, settings, recorded, replayed)),
-        notes=[
-            *settings.assumed, *_changes(bag), *inputs.lacks, *gaps,
-            *(f'leg {leg}: {count} samples rejected, the last one: {reason}'
-              for leg, (count, reason) in player.refused.items()),
-            *filter(None, (bag.problem, inputs.late, note)),
-        ],
-    )  # fmt: skip
+        outcomes=list(_outcomes(inputs.streams[SAMPLE.name], settings, recorded, replayed)),
+        notes=[each for each in notes if each],
+    )
 
 
 def _changes(bag: BagReader) -> Iterator[str]:
@@ -268,40 +243,26 @@ def _changes(bag: BagReader) -> Iterator[str]:
 
 
 def _outcomes(
-    inputs: _Inputs, settings: NodeSettings, recorded: Tracks, replayed: Tracks
+    samples: Stream, settings: NodeSettings, recorded: Tracks, replayed: Tracks
 ) -> Iterator[Outcome]:
-    values = settings.values
-    gate = values['load_gate'] * values['expected_load']
-    delay_ns = round(2e9 / values['publish_rate'])  # until the estimate of a stance is there
-    for place, leg in enumerate(inputs.legs):
-        ends = _stance_ends(inputs, place, gate) + delay_ns
-        wet, slips, switches = [], [], []
+    gate = settings.values['load_gate'] * settings.values['expected_load']
+    delay_ns = round(2e9 / settings.values['publish_rate'])  # until a stance's estimate is there
+    for place, leg in enumerate(samples.legs):
+        load = samples.block.rows['force'][:, place, 2]
+        stamps, load = samples.block.stamps[np.isfinite(load)], load[np.isfinite(load)]
+        stands = standing(stamps * 1e-9, load[:, None], gate)[:, 0]
+        ends = (stamps[1:][stands[:-1] & ~stands[1:]] + delay_ns).tolist()
+        counts = []
         for tracks in (recorded, replayed):
-            wetness, slipping, shape = (
-                tracks[leg, name] for name in ('wetness', 'slipping', 'morphology')
-            )
-            wet.append(sum(wetness.at(end) > 0.5 for end in ends.tolist()))
-            slips.append(int(np.sum(np.diff(slipping.values[:, 0] == 1.0, prepend=0) > 0)))
-            switches.append(int(np.sum(np.diff(shape.values[:, 0]) != 0.0)))
-        there = [len(recorded[leg, name].times) > 0 for name in ('wetness', 'morphology')]
-        yield Outcome(
-            leg,
-            len(ends),
-            (wet[0] if there[0] else None, wet[1]),
-            (slips[0] if there[0] else None, slips[1]),
-            (switches[0] if there[1] else None, switches[1]),
-        )
-
-
-def _stance_ends(inputs: _Inputs, place: int, load: float) -> np.ndarray:
-    """Return the stamps at which a leg lifts off, ns; a bounce is no lift-off."""
-    stamps, rows = inputs.streams['sample'].block
-    force = rows['force'][:, place, 2]
-    stamps, force = stamps[np.isfinite(force)], force[np.isfinite(force)]
-    step = np.diff((force >= load).astype(int))
-    ends, landings = stamps[1:][step < 0], stamps[1:][step > 0]
-    last = np.append(landings, np.iinfo(np.int64).max)
-    return ends[last[np.searchsorted(landings, ends)] - ends >= BOUNCE * 1e9]
+            wetness, slipping, dome = (tracks[leg, n] for n in ('wetness', 'slipping', 'dome'))
+            wet = slips = switches = None
+            if len(wetness.times):
+                wet = sum(wetness.at(end) > 0.5 for end in ends)
+                slips = int(np.sum(np.diff(slipping.values[:, 0] == 1.0, prepend=0) > 0))
+            if len(dome.times):
+                switches = int(np.sum(np.diff(dome.values[:, 0]) != 0.0))
+            counts.append((wet, slips, switches))
+        yield Outcome(leg, len(ends), *zip(*counts, strict=True))
 
 
 # --- what was recorded --------------------------------------------------------------------------
@@ -312,64 +273,73 @@ class _Inputs(NamedTuple):
 
     Attributes
     ----------
-    legs : tuple of int
-        Legs that can be replayed.
     streams : dict of Stream
-        Records by name of their kind, of these legs.
+        Records of the legs that can be replayed, by name of their kind.
     gap_ns : float
         Log time of the first gap, ns, from which on differences are excused.
-    gaps, lacks : list of str
-        Notes on gaps, and on what was not recorded at all.
-    late : str
-        Note on samples that are left out because the estimator started later; empty if none are.
+    notes : list of str
+        What was not recorded, and what is left out.
     """
 
-    legs: tuple[int, ...]
     streams: dict[str, Stream]
     gap_ns: float
-    gaps: list[str]
-    lacks: list[str]
-    late: str
+    notes: list[str]
 
 
 def _inputs(bag: BagReader, recording: Recording, settings: NodeSettings) -> _Inputs:
-    """Return what is replayed; what drivers published by leg is joined into records."""
-    known, joined = recording.legs, SAMPLE.name in recording.topics
-    felt = np.isfinite(recording.streams['sample'].values('force')[..., 2]).any(axis=0)
-    there = {leg for leg, own in zip(known, felt, strict=True) if own or joined}
-    if not there or not len(felt) or not len(recording.streams['sample'].times):
+    """Return what is replayed."""
+    samples = recording.streams[SAMPLE.name]
+    loaded = np.isfinite(samples.block.rows['force'][..., 2]).any(axis=0)
+    there = {leg for leg, own in zip(samples.legs, loaded, strict=True) if own}
+    if SAMPLE.name in recording.topics:
+        there = {*samples.legs}
+    if not there or not len(samples.times):
         raise BagError(
             f'{bag.path}: no wrench of a leg was recorded; the topics are'
             f' {", ".join(sorted(bag.topics))}. If one has wrenches, name it with a remap'
         )
     # Keep the order of the legs in the controller of the bag, around the body.
     legs = (*(leg for leg in settings.legs if leg in there), *sorted(there - {*settings.legs}))
-    places = [known.index(leg) for leg in legs]
-    streams = {
-        name: each._replace(legs=legs, block=Block(each.block.stamps, each.block.rows[:, places]))
-        for name, each in recording.streams.items()
-    }
-    needed: tuple[str, ...] = ('force', 'position')
-    if settings.tuning.source == 'joints':
-        needed = ('force', 'position', 'velocity')
-    gaps = [
-        *_gaps(streams['sample'], () if joined else needed),
-        *_gaps(streams['pressure'], () if 'pressure' in recording.topics else ('pressure',)),
-    ]
-    if not joined:
-        streams['sample'] = _joined(streams['sample'], needed)
+    streams = {name: each.of_legs(legs) for name, each in recording.streams.items()}
+    needed = ['force', 'position']
+    needed += ['velocity'] if settings.tuning.source == 'joints' else []
+    lacks, gaps = [], []
+    for kind, names in ((SAMPLE.name, needed), (PRESSURE.name, ['pressure'])):
+        stream = streams[kind]
+        for name in names:
+            known = np.isfinite(stream.values(name)).any(axis=2)
+            lacks += [f'{name} of leg {leg}' for leg in np.array(legs)[~known.any(axis=0)]]
+            if kind not in recording.topics:
+                gaps += [_gap(stream, f'{name} of leg {leg}', own)
+                         for leg, own in zip(legs, known.T, strict=True)]  # fmt: skip
+        if kind in recording.topics:
+            gaps.append(_gap(stream, kind, np.full(len(stream.times), True)))
+    lacks += [f'force of leg {leg}' for leg in sorted({*recording.legs, *settings.legs} - there)]
     late = _leave_out(streams)
-    gaps = sorted(gap for gap in gaps if gap[0] >= streams['sample'].times[0])
-    lacks = _lacks(streams, legs, sorted({*known, *settings.legs} - there), needed)
-    notes = [
+    begin = streams[SAMPLE.name].times[0]
+    found = sorted(gap for gap in gaps if gap and gap[0] >= begin)
+    notes = [f'not recorded, so differences are excused: {", ".join(lacks)}'] if lacks else []
+    notes += [
         f'{what}: {count} gap{"s" if count > 1 else ""}, the first'
         f' {(time_ns - bag.start) * 1e-9:.3f} s after the beginning: what was not recorded cannot'
         ' be replayed'
-        for time_ns, what, count in gaps
+        for time_ns, what, count in found
     ]
     # What was lost may have changed all legs: they share what feet learn, and one controller.
-    gap_ns = -math.inf if lacks else min((float(gap[0]) for gap in gaps), default=math.inf)
-    return _Inputs(legs, streams, gap_ns, notes, lacks, late)
+    gap_ns = -math.inf if lacks else min((float(gap[0]) for gap in found), default=math.inf)
+    return _Inputs(streams, gap_ns, [*notes, late])
+
+
+def _gap(stream: Stream, what: str, there: np.ndarray) -> tuple[int, str, int] | None:
+    """Return log time of the first gap in some records, ns, what has gaps, and their number."""
+    wide = _wide(stream.block.stamps[there])
+    return (int(stream.times[there][wide[0]]), what, len(wide)) if len(wide) else None
+
+
+def _wide(stamps: np.ndarray) -> np.ndarray:
+    """Return the places of the records after which there is a gap."""
+    steps = np.diff(stamps)
+    return np.flatnonzero(steps > LONGER * max(np.median(steps), 0.0)) if len(steps) else steps
 
 
 def _leave_out(streams: dict[str, Stream]) -> str:
@@ -394,58 +364,6 @@ def _leave_out(streams: dict[str, Stream]) -> str:
     )
 
 
-def _joined(pieces: Stream, needed: tuple[str, ...]) -> Stream:
-    """Return records of all legs, with the log time of the last piece of each."""
-    kind, legs, times, (stamps, rows) = pieces.where(np.argsort(pieces.times, kind='stable'))
-    joiner, found, time_ns = Joiner(kind, legs, needed), [], 0
-    numbers = rows.view('f8').reshape(*rows.shape, -1)
-    for time_ns, stamp_ns, each in zip(times.tolist(), stamps.tolist(), numbers, strict=True):
-        for row in np.flatnonzero(~np.isnan(each).all(axis=1)).tolist():
-            values = dict(zip(kind.columns, each[row].tolist(), strict=True))
-            values = {name: value for name, value in values.items() if not math.isnan(value)}
-            found += [(time_ns, block) for block in joiner.add(legs[row], stamp_ns, values)]
-    found += [(time_ns, block) for block in joiner.expire(math.inf)]
-    return Stream.of(kind, legs, found)
-
-
-def _gaps(stream: Stream, fields: Sequence[str]) -> Iterator[tuple[int, str, int]]:
-    """Yield gaps of records or, where drivers published by leg, of each of these fields and leg.
-
-    These are the log time of the first one, ns, what has gaps, and their number.
-    """
-    sources = {} if fields else {stream.kind.name: np.full(len(stream.times), True)}
-    for name in fields:
-        own = ~np.isnan(stream.values(name)).all(axis=2)
-        sources |= {f'{name} of leg {leg}': own[:, i] for i, leg in enumerate(stream.legs)}
-    for what, there in sources.items():
-        if len(wide := _wide(stream.block.stamps[there])):
-            yield int(stream.times[there][wide[0]]), what, len(wide)
-
-
-def _wide(stamps: np.ndarray) -> np.ndarray:
-    """Return the places of the records after which there is a gap."""
-    steps = np.diff(stamps)
-    return np.flatnonzero(steps > LONGER * max(np.median(steps), 0.0)) if len(steps) else steps
-
-
-def _lacks(
-    streams: Mapping[str, Stream], legs: tuple[int, ...], absent: list[int], needed: Sequence[str]
-) -> list[str]:
-    """Return notes on legs of which something was not recorded at all, one sentence each."""
-    found = [(absent, 'wrench', 'the decisions for other legs lack its footprints')]
-    for name in (*needed[1:], 'pressure'):
-        kind = 'pressure' if name == 'pressure' else 'sample'
-        known = np.isfinite(streams[kind].values(name)).any(axis=(0, 2))
-        lack = [leg for leg, own in zip(legs, known, strict=True) if not own]
-        so = 'its pads are assumed to be flat' if name == 'pressure' else 'there are no estimates'
-        found.append((lack, name, so))
-    return [
-        f'leg {", ".join(map(str, lack))}: no {name} was recorded, so {so}'
-        for lack, name, so in found
-        if lack
-    ]
-
-
 # --- passing it on ------------------------------------------------------------------------------
 
 
@@ -462,8 +380,8 @@ class _Player:
         Number of rejected samples and estimates, and the reason of the last one, by leg.
     """
 
-    def __init__(self, settings: NodeSettings, inputs: _Inputs) -> None:
-        self._inputs, legs = inputs, inputs.legs
+    def __init__(self, settings: NodeSettings, streams: Mapping[str, Stream]) -> None:
+        self._streams, legs = streams, streams[SAMPLE.name].legs
         self.refused: dict[int, tuple[int, str]] = {}
         period_ns = round(1e9 / settings.values['publish_rate'])
         self.stages = Pipeline(
@@ -473,7 +391,7 @@ class _Player:
             ),
             DecisionStage(settings.controller(legs), legs, self._reject),
         )  # fmt: skip
-        stamps, rows = inputs.streams[COMMAND.name].block
+        stamps, rows = streams[COMMAND.name].block
         self._setpoints = dict(zip(stamps.tolist(), rows['setpoint'], strict=True))  # recorded
         # Whether the set-point of each leg differs from the recorded one.
         self._apart = np.full(len(legs), not self._setpoints)
@@ -482,7 +400,7 @@ class _Player:
     def play(self, progress: Progress | None) -> dict[str, Stream]:
         """Play everything; return estimates and commands by name of their kind."""
         made: dict[Kind, list[tuple[int, Block]]] = {ESTIMATE: [], COMMAND: []}
-        samples, pressures = (self._inputs.streams[name] for name in ('sample', 'pressure'))
+        samples, pressures = (self._streams[name] for name in ('sample', 'pressure'))
         stamps, rows = samples.block
         done = 0
         for start, end, until in _blocks(samples.times, pressures.times):
@@ -498,8 +416,7 @@ class _Player:
                 self._follow(command)
             if progress:
                 progress(end / len(stamps))
-        legs = self._inputs.legs
-        return {kind.name: Stream.of(kind, legs, each) for kind, each in made.items()}
+        return {kind.name: Stream.of(kind, samples.legs, each) for kind, each in made.items()}
 
     def _press(self, stamp_ns: int, rows: np.ndarray) -> None:
         """Process a pressure record."""
@@ -547,4 +464,4 @@ def _blocks(samples: np.ndarray, pressures: np.ndarray) -> Iterator[tuple[int, i
         yield start, end, int(before[start])
 
 
-__all__ = ['Outcome', 'Replay', 'open_bag', 'replay']
+__all__ = ['Outcome', 'Replay', 'replay']

@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-import heapq
 import json
 import math
 import operator
 from collections.abc import Iterator, Mapping
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 
 from ros_pad.bags import BagReader
-from ros_pad.bags.codec import field_getter
 from ros_pad.bags.topics import FORCE, IMU, JOINT_STATES, ODOM, SAMPLE, STAMP
 from ros_pad.errors import ConfigError, InvalidInput, reason
 from ros_pad.records import SAMPLE as SAMPLES
@@ -67,16 +66,22 @@ def compare_body(bag: BagReader, sample: str) -> tuple[list[Comparison], str]:
     except (ConfigError, InvalidInput, KeyError) as error:
         return [], f'the body estimator is not replayed: {reason(error)}'
     gap_ns = math.inf if bag.counts.get('/clock') else -math.inf
-    feet = Stream(SAMPLES, *bag.records({sample: SAMPLES})[sample])
+    records, tables = bag.read({sample: SAMPLES}, {odom: (*STAMP, *ODOM.values)})
+    feet = Stream(SAMPLES, *records[sample])
     # At moments without an estimate, the node sends records without values.
     feet = feet.where(np.isfinite(feet.block.rows['force']).any(axis=(1, 2)))
-    times, table = bag.tables({odom: (*STAMP, *ODOM.values)})[odom]
-    stamps = table[:, :2].astype(np.int64) @ np.array([1_000_000_000, 1])
-    poses = Stream(_POSE, (OF_BODY,), times, Block(stamps, table[:, 2:].copy().view(_POSE.dtype)))
+    times, table = tables[odom]
+    block = Block(_stamps(table), table[:, 2:].copy().view(_POSE.dtype))
+    poses = Stream(_POSE, (OF_BODY,), times, block)
     return [
         *compare(odom, poses, made_poses, bag.start, gap_ns),
         *compare(sample, feet, made_feet, bag.start, gap_ns),
     ], ''
+
+
+def _stamps(table: np.ndarray) -> np.ndarray:
+    """Return the stamps, ns, with which the rows of a table begin."""
+    return table[:, :2].astype(np.int64) @ np.array([10**9, 1])
 
 
 def _play(
@@ -94,12 +99,11 @@ def _play(
         poses.append((stamp_ns, Block.of(stamp_ns, pose)))
         feet.append((stamp_ns, Block.of(stamp_ns, sample_of(estimate))))
 
-    imu_numbers = field_getter(IMU.values)
     stage = SensingStage(
         robot, estimator_of(robot, values), take, lambda doubt: None, lambda error: None,
         values['forces'],
     )  # fmt: skip
-    for _, topic, stamp_ns, content in _messages(bag, force, imu, joints):
+    for topic, stamp_ns, content in _messages(bag, force, imu, joints):
         if topic == joints:
             try:
                 standard.read('joint_states', content, 0).pass_to(stage)
@@ -109,29 +113,29 @@ def _play(
             for index, each in enumerate(content):
                 if math.isfinite(each.sum()):
                     stage.force(index, stamp_ns, each)
-        else:
-            numbers = list(imu_numbers(content))
-            if math.isfinite(sum(numbers)):
-                stage.imu(stamp_ns, numbers[:3], numbers[3:])
+        elif math.isfinite(sum(content)):
+            stage.imu(stamp_ns, content[:3], content[3:])
     if not stage.samples:
         raise wrong
     legs = tuple(values['legs'])
     return Stream.of(_POSE, (OF_BODY,), poses), Stream.of(SAMPLES, legs, feet)
 
 
-def _messages(
-    bag: BagReader, force: str, imu: str, joints: str
-) -> Iterator[tuple[int, str, int, Any]]:
-    """Yield log time, ns, topic, stamp, ns, and message, or forces, in the order of recording."""
-    messages = (
-        (log_ns, topic, message.header.stamp.sec * 10**9 + message.header.stamp.nanosec, message)
-        for topic, message, log_ns in bag.messages({imu, joints})
-    )
-    _, times, (stamps, rows) = bag.records({force: SAMPLES})[force]
-    each = zip(times.tolist(), stamps.tolist(), rows['force'], strict=True)
-    forces = ((log_ns, force, stamp_ns, own) for log_ns, stamp_ns, own in each)
+def _messages(bag: BagReader, force: str, imu: str, joints: str) -> Iterator[tuple[str, int, Any]]:
+    """Yield topic, stamp, ns, and forces, numbers or message, in the order of recording."""
+    records, tables = bag.read({force: SAMPLES}, {imu: (*STAMP, *IMU.values)})
+    _, times, block = records[force]
+    imu_times, table = tables[imu]
+    found: list[tuple[int, int, str, Any]] = [
+        *zip(times, block.stamps, repeat(force), block.rows['force'], strict=False),
+        *zip(imu_times, _stamps(table), repeat(imu), table[:, 2:].tolist(), strict=False),
+    ]
+    for _, message, log_ns in bag.messages({joints}):
+        stamp = message.header.stamp
+        found.append((log_ns, stamp.sec * 10**9 + stamp.nanosec, joints, message))
     # Forces come first: readings of the joints wait for those of the same moment.
-    return heapq.merge(forces, messages, key=operator.itemgetter(0))
+    for _, stamp_ns, topic, content in sorted(found, key=operator.itemgetter(0)):
+        yield topic, int(stamp_ns), content
 
 
 __all__ = ['compare_body']

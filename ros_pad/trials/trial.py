@@ -14,8 +14,20 @@ from ros_pad.simulation.terrain import Floor
 
 BOUNCE = 0.03  # s; a stance does not end if a foot is without load for less than this
 
-
-OFTEN = 3  # up to so many faults of one kind on one leg are listed one by one
+SLOW = np.dtype(
+    [
+        ('pressure', 'f8'),  # gauge, Pa
+        ('setpoint', 'f8'),  # gauge, Pa
+        ('wetness', 'f8'),  # probability that the ground is wet
+        ('friction', 'f8'),  # estimated coefficient of friction
+        ('margin', 'f8'),  # friction margin
+        ('slip_speed', 'f8'),  # estimated, m/s
+        ('slipping', '?'),  # slip alarm
+        ('dome', '?'),  # whether the chosen morphology is dome
+        ('doubt', 'i8'),  # place in estimation.DOUBTS, 0: none; -1: not on record
+    ]
+)
+"""What is known of a foot at a control step; numbers that are unknown are NaN."""
 
 
 @dataclass(frozen=True)
@@ -85,31 +97,31 @@ class Metrics:
         return asdict(self)
 
 
-def fault_lines(faults: Iterable[dict[str, Any]]) -> list[str]:
-    """Describe faults of legs, one line each, see ``Metrics.faults``.
+def standing(time: np.ndarray, load: np.ndarray, load_gate: float) -> np.ndarray:
+    """Return whether feet stand at each time, s, (n, legs); see :meth:`Trial.standing`.
 
-    If a kind of fault occurred more than :data:`OFTEN` times on a leg, one line describes all.
+    A foot that bounces, without load for less than ``BOUNCE``, still stands.
     """
+    loaded = load > load_gate
+    since = np.maximum.accumulate(np.where(loaded, time[:, None], -np.inf), axis=0)
+    until = np.minimum.accumulate(np.where(loaded, time[:, None], np.inf)[::-1], axis=0)[::-1]
+    return until - since < BOUNCE
+
+
+def fault_lines(faults: Iterable[dict[str, Any]]) -> list[str]:
+    """Describe faults of legs, see ``Metrics.faults``: a line for each kind and leg."""
     alike: dict[tuple[int, str], list[dict[str, Any]]] = {}
     for fault in faults:
         alike.setdefault((fault['leg'], fault['kind']), []).append(fault)
     lines = []
-    for (leg, kind), found in alike.items():
-        if len(found) > OFTEN:
-            lines.append(
-                f'Leg {leg}, {len(found)} times from {found[0]["start"]:.1f} s to'
-                f' {_end(found[-1])}: {kind}'
-            )
-        else:
-            lines += [
-                f'Leg {leg}, from {each["start"]:.1f} s to {_end(each)}: {each["reason"]}'
-                for each in found
-            ]
+    for (leg, kind), own in alike.items():
+        start, end = own[0]['start'], own[-1]['end']
+        times, what = '', own[0]['reason']
+        if len(own) > 1:
+            times, what = f'{len(own)} times ', kind
+        until = 'the end' if end is None else f'{end:.1f} s'
+        lines.append(f'Leg {leg}, {times}from {start:.1f} s to {until}: {what}')
     return lines
-
-
-def _end(fault: dict[str, Any]) -> str:
-    return 'the end' if fault['end'] is None else f'{fault["end"]:.1f} s'
 
 
 def heading(x: float, y: float, z: float, w: float) -> float:
@@ -149,25 +161,8 @@ class Trial:
         Measured position of each foot, m.
     slow_time : ndarray (m,)
         Time of each control step, s.
-    pressure : ndarray (m, legs)
-        Gauge pressure, Pa.
-    setpoint : ndarray (m, legs)
-        Set-point, gauge Pa.
-    wet_probability : ndarray (m, legs)
-        Probability of wet ground, 0 to 1.
-    friction : ndarray (m, legs)
-        Estimated coefficient of friction.
-    margin : ndarray (m, legs)
-        Friction margin, no unit.
-    slip_speed : ndarray (m, legs)
-        Estimated slip speed, m/s.
-    slipping : ndarray of bool (m, legs)
-        Slip alarm.
-    dome : ndarray of bool (m, legs)
-        Whether the chosen morphology is dome.
-    doubt : ndarray of int (m, legs)
-        Why the ground was unobservable, as an index in :data:`ros_pad.estimation.DOUBTS`; 0 if it
-        was observable, -1 if this is unknown. Shape (0, 0) where no doubts are on record.
+    slow : structured ndarray (m, legs)
+        What is known at each control step, see :data:`SLOW`.
     odom : ndarray (n, 3)
         Estimated position x and y of the body, m, and heading, rad, in odom; shape (0, 3) with
         markers. Feet are in the world all the same.
@@ -191,43 +186,15 @@ class Trial:
     force: np.ndarray
     position: np.ndarray
     slow_time: np.ndarray
-    pressure: np.ndarray
-    setpoint: np.ndarray
-    wet_probability: np.ndarray
-    friction: np.ndarray
-    margin: np.ndarray
-    slip_speed: np.ndarray
-    slipping: np.ndarray
-    dome: np.ndarray
+    slow: np.ndarray
+    odom: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     floor: Floor | None = None
     metrics: Metrics | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     real_time_factor: float | None = None
-    doubt: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=int))
-    odom: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-
-    def move_to_world(self) -> None:
-        """Move the feet of a trial with odom from there to the world of the body's true pose.
-
-        Odom is where the body estimator takes the robot to be; it drifts. Feet are placed by the
-        true pose of the body, as they stand to its estimated one.
-        """
-        turn = (self.body[:, 2] - self.odom[:, 2])[:, None]
-        cosine, sine = np.cos(turn), np.sin(turn)
-
-        def turned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-            return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=2)
-
-        arms = self.position[:, :, :2] - self.odom[:, None, :2]
-        self.position = self.position.copy()
-        self.position[:, :, :2] = self.body[:, None, :2] + turned(arms[..., 0], arms[..., 1])
-        self.force = self.force.copy()
-        self.force[:, :, :2] = turned(self.force[:, :, 0], self.force[:, :, 1])
 
     def standing(self, load_gate: float) -> np.ndarray:
         """Return whether each foot stands at each sensor sample.
-
-        A foot that bounces, without load for less than ``BOUNCE``, still stands.
 
         Parameters
         ----------
@@ -239,11 +206,7 @@ class Trial:
         array of bool (n, legs)
             True in stance.
         """
-        loaded = self.force[:, :, 2] > load_gate
-        time = self.time[:, None]
-        since = np.maximum.accumulate(np.where(loaded, time, -np.inf), axis=0)
-        until = np.minimum.accumulate(np.where(loaded, time, np.inf)[::-1], axis=0)[::-1]
-        return until - since < BOUNCE
+        return standing(self.time, self.force[:, :, 2], load_gate)
 
     def wet(self) -> np.ndarray:
         """Return whether the true ground below each foot is wet.

@@ -294,7 +294,7 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     controller.footprints = Footprints(**setup.footprints)
     loop.connect(controller, period_ns=period_ns)
     loop.pipeline = loop.pipeline._replace(estimation=estimation)
-    loops.walk(loop, world)
+    loops.walk(loop)
     return loop.robot.body[0] / world.cycles, loop.robot.verdict
 
 

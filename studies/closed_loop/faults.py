@@ -15,7 +15,6 @@ import numpy as np
 
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.trial import Trial
 from studies import command
@@ -40,9 +39,8 @@ def walked(scene: Scene, seed: int, fidelity: str, monitored: bool = True) -> Tr
     loop = ClosedLoop(scene, 'adaptive', seed, fidelity)
     if not monitored:
         loop.controller.observe = lambda *_: None  # type: ignore[method-assign]
-    log = TrialLog(scene, 'adaptive', seed, fidelity)
-    loops.walk(loop, scene, log)
-    return log.finish(loop.robot, loop.controller, loop.floor, None)
+    loops.walk(loop)
+    return loop.trial()
 
 
 def advance(trial: Trial) -> float:
@@ -59,7 +57,7 @@ def on_floor(seed: int, fidelity: str, cycles: int) -> dict[str, list[float]]:
     """Return for each fault the distances of :data:`COLUMNS` on one floor, mm a cycle."""
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=cycles)
     sound = walked(scene, seed, fidelity)
-    domed = sound.slow_time[np.argmax(sound.dome[:, LEG - 1])] + 0.4
+    domed = sound.slow_time[np.argmax(sound.slow['dome'][:, LEG - 1])] + 0.4
     found = {}
     for name, text in FAULTS.items():
         fault = Fault.parse(text % domed if '%' in text else text)

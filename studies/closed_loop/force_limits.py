@@ -25,7 +25,6 @@ from ros_pad.errors import NoEquilibrium
 from ros_pad.simulation import Scene
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.closed_loop import loops
 from studies.drawing import STYLE
 
 MEASURED = {65e3: 0.15, 75e3: 0.30, 85e3: 0.40}
@@ -130,7 +129,7 @@ def walk(scene: str, policy: str, criterion: str, seed: int) -> dict[str, Any]:
     world = replace(world, foot=replace(world.foot, limit=criterion))
     loop = ClosedLoop(world, policy, seed)
     domed, samples = [], 0
-    for _ in loops.samples(loop, world):
+    for _ in loop.walk():
         samples += len(world.legs)
         domed += [p for p in map(loop.controller.setpoint, world.legs) if p > 0.0]
     cycles = (loop.robot.time - world.settle) / world.gait.cycle

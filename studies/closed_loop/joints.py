@@ -22,7 +22,6 @@ from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.sensing import BodyEstimate
 from ros_pad.simulation import Scene
-from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.series import held
@@ -129,10 +128,10 @@ def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk
     """Walk a shipped scene on full dynamics for a number of gait cycles."""
     scene = replace(Scene.load(name), cycles=cycles)
     loop = ClosedLoop(scene, policy, seed, 'L2', sensing=sensing)
-    robot, log = loop.robot, TrialLog(scene, policy, seed, 'L2', sensing)
+    robot, log = loop.robot, loop.log
     truth, gate = _Truth(robot), GATE * scene.expected_load
     rows = []
-    for _ in loops.samples(loop, scene, log):
+    for _ in loop.walk():
         rows.append([(foot.force[2], foot.slip_speed, foot.wet) for foot in robot.feet])
         if loop.body:
             truth.compare(loop.body.estimate, gate)

@@ -3,52 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.records import ESTIMATE, Block
-from ros_pad.simulation.scene import Scene
-from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.series import Records, held
 
 
-class NoLog(TrialLog):
-    """A log that keeps nothing."""
-
-    def __init__(self) -> None:
-        pass
-
-    def samples(self, *_: Any) -> None:
-        """Ignore samples."""
-
-    def control(self, *_: Any) -> None:
-        """Ignore a control step."""
-
-
-def samples(loop: ClosedLoop, scene: Scene, log: TrialLog | None = None) -> Iterator[None]:
-    """Walk a scene and yield after each sample, until the scene ends or a verdict ends it early.
-
-    The loop is closed afterwards.
-    """
-    log = log or NoLog()
-    try:
-        for _ in range(round(scene.duration * 1e9) // loop.period_ns):
-            loop.tick(log)
-            yield
-            if loop.robot.verdict:
-                break
-        loop.finish(log)
-    finally:
-        loop.close()
-
-
-def walk(loop: ClosedLoop, scene: Scene, log: TrialLog | None = None) -> None:
+def walk(loop: ClosedLoop) -> None:
     """Walk a scene until it ends or a verdict ends it early."""
-    for _ in samples(loop, scene, log):
+    for _ in loop.walk():
         pass
 
 

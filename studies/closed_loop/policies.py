@@ -165,7 +165,7 @@ def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: in
         fixed_pressure=scene.dome_pressure,
     )
     loop.connect(controller, known)
-    loops.walk(loop, scene)
+    loops.walk(loop)
     return loop
 
 

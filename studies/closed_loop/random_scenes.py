@@ -169,7 +169,7 @@ def walk(scene: Scene, policy: str, seed: int, level: str, top: bool = False) ->
                 break
         loop.close()
     else:
-        loops.walk(loop, scene)
+        loops.walk(loop)
     if loop.robot.verdict:
         return None
     slip = float(np.mean([foot.slip_path for foot in loop.robot.feet]))

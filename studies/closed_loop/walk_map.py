@@ -138,5 +138,5 @@ def _stances(trial: Trial, load_gate: float) -> Iterator[tuple[np.ndarray, np.nd
             if len(places):
                 tenth = max(1, len(places) // 10)  # average, because the marker is noisy
                 row = np.searchsorted(trial.slow_time, trial.time[(start + end) // 2]) - 1
-                dome = bool(trial.pressure[max(row, 0), column] > DOME_PRESSURE)
+                dome = bool(trial.slow['pressure'][max(row, 0), column] > DOME_PRESSURE)
                 yield places[:tenth].mean(axis=0), places[-tenth:].mean(axis=0), dome

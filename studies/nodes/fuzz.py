@@ -230,10 +230,6 @@ def _records() -> Target:
             raise
         except PadError as error:
             raise AssertionError('bytes of a message raise nothing but BadMessage') from error
-        twice = wire.table([message, message])
-        for part, whole in zip(block, twice, strict=True):
-            if whole.tobytes() != 2 * part.tobytes():
-                raise AssertionError(f'{part}, but {whole} in a table')
         again = wire.decode(wire.encode(block))
         if again.rows.tobytes() != block.rows.tobytes():
             raise AssertionError(f'{block} is read as {again}')

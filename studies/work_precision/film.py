@@ -34,7 +34,6 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.simulation import Scene
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.closed_loop import loops
 from studies.drawing import BLUE, GREEN, ORANGE, PALE, STYLE, VERMILION
 from studies.samples import runs
 from studies.work_precision.comparison import Method, Problem, Result, run
@@ -282,8 +281,7 @@ def landings() -> list[dict[str, Any]]:
         found = []
         for seed in SEEDS:
             loop = ClosedLoop(scene, 'dome', seed, fidelity='L2')
-            walked = loops.samples(loop, scene)
-            force = np.array([[f.force[2] for f in loop.robot.feet] for _ in walked])
+            force = np.array([[f.force[2] for f in loop.robot.feet] for _ in loop.walk()])
             for leg in force.T:
                 found += rise_times(leg, 1.0 / RATE)
         half, most = np.quantile(found, (0.05, 0.5, 0.95), axis=0).T.tolist()

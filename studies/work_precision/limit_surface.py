@@ -259,7 +259,7 @@ def walked(turning: float, policy: str, seed: int) -> float:
     scene = Scene.load(SCENE)
     with mock.patch.object(Foot, 'turning_radius', turning):
         loop = ClosedLoop(scene, policy, seed, 'L1')
-        walk(loop, scene)
+        walk(loop)
     return loop.robot.body[0]
 
 

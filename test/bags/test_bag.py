@@ -5,10 +5,6 @@ import os
 import random
 import resource
 import shutil
-import subprocess
-import sys
-import textwrap
-import time
 import warnings
 
 import numpy as np
@@ -18,16 +14,13 @@ import yaml
 pytest.importorskip('rclpy', reason='rclpy is needed: it serializes the messages')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PoseStamped, TwistWithCovarianceStamped, WrenchStamped
+from geometry_msgs.msg import TwistWithCovarianceStamped, WrenchStamped
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, Writer
-from mcap_ros2.decoder import DecoderFactory
+from mcap.writer import Writer
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import FluidPressure
-from std_msgs.msg import Bool, Float64, String
+from std_msgs.msg import Bool, Float64
 
 from ros_pad.bags import BagReader, BagWriter, annotate
 from ros_pad.bags.codec import definition_of
@@ -50,12 +43,8 @@ QOS = """
 MESSAGES = [
     WrenchStamped,
     TwistWithCovarianceStamped,
-    PoseStamped,
-    FluidPressure,
     Float64,
     Bool,
-    String,
-    Clock,
     DiagnosticArray,
 ]
 
@@ -77,19 +66,10 @@ def example(message_class, number, chance):
         case TwistWithCovarianceStamped():
             message.twist.twist.linear.x = chance.gauss(0.0, 1.0)
             message.twist.covariance = [chance.gauss(0.0, 1.0) for _ in range(36)]
-        case PoseStamped():
-            message.pose.position.y = chance.gauss(0.0, 1.0)
-            message.pose.orientation.w = 1.0
-        case FluidPressure():
-            message.fluid_pressure = 101325.0 + chance.uniform(0.0, 75e3)
         case Float64():
             message.data = chance.random()
         case Bool():
             message.data = bool(number % 2)
-        case String():
-            message.data = ['flat', 'dome', ''][number % 3]
-        case Clock():
-            message.clock.sec = number
         case DiagnosticArray():
             values = [KeyValue(key='κ', value=str(number))] * (number % 4)
             message.status = [DiagnosticStatus(level=b'\x01', name='bus', values=values)]
@@ -104,8 +84,6 @@ def plain(value):
         names = [field.name for field in dataclasses.fields(value)]
         # All fields of ROS messages are in lower case; the rest are constants and the type.
         return {n: plain(getattr(value, n)) for n in names if n.islower() and n[:2] != '__'}
-    if hasattr(value, '_full_text'):  # mcap_ros2
-        return {name: plain(getattr(value, name)) for name in value.__slots__}
     if isinstance(value, bytes):  # some libraries read a byte as a number
         return value[0] if len(value) == 1 else list(value)
     if isinstance(value, (str, bool, int, float)):
@@ -172,81 +150,37 @@ def test_rosbags_reads_the_same(recorded):
     assert order == sorted(written, key=lambda entry: (entry[2], entry[0]))
 
 
-def test_mcap_ros2_reads_the_same(recorded):
-    folder, written = recorded
-    with (folder / 'trial_0.mcap').open('rb') as stream:
-        reader = make_reader(stream, decoder_factories=[DecoderFactory()], validate_crcs=True)
-        assert reader.get_header().profile == 'ros2'
-        summary = reader.get_summary()
-        assert summary.statistics.message_count == len(written)
-        for channel in summary.channels.values():
-            assert yaml.safe_load(channel.metadata['offered_qos_profiles'])[0]['depth'] == 10
-            assert channel.metadata['topic_type_hash'].startswith('RIHS01_')
-        read = [
-            (entry.channel.topic, plain(entry.decoded_message), entry.message.log_time)
-            for entry in reader.iter_decoded_messages(log_time_order=False)
-        ]
-    assert read == written
-
-
 def test_metadata_is_what_rosbag2_of_jazzy_writes(tmp_path):
     folder = one_bag(tmp_path / 'test', custom_data={'seed': '0'})
     text = (folder / 'metadata.yaml').read_text()
     assert '&' not in text and '*' not in text  # no YAML anchors
     # Keys, their order and the form of each value are those of `ros2 bag record -s mcap`.
-    expected = yaml.safe_load(
-        """
-rosbag2_bagfile_information:
-  version: 9
-  storage_identifier: mcap
-  duration:
-    nanoseconds: 9
-  starting_time:
-    nanoseconds_since_epoch: 0
-  message_count: 10
-  topics_with_message_count:
-    - topic_metadata:
-        name: /data
-        type: std_msgs/msg/Float64
-        serialization_format: cdr
-        offered_qos_profiles:
-          - history: keep_last
-            depth: 10
-            reliability: reliable
-            durability: volatile
-            deadline:
-              sec: 9223372036
-              nsec: 854775807
-            lifespan:
-              sec: 9223372036
-              nsec: 854775807
-            liveliness: automatic
-            liveliness_lease_duration:
-              sec: 9223372036
-              nsec: 854775807
-            avoid_ros_namespace_conventions: false
-        type_description_hash:
-          RIHS01_705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a
-      message_count: 10
-  compression_format: ""
-  compression_mode: ""
-  relative_file_paths:
-    - test_0.mcap
-  files:
-    - path: test_0.mcap
-      starting_time:
-        nanoseconds_since_epoch: 0
-      duration:
-        nanoseconds: 9
-      message_count: 10
-  custom_data:
-    seed: '0'
-  ros_distro: jazzy
-"""
-    )
-    assert yaml.safe_load(text) == expected
-    order = list(yaml.safe_load(text)['rosbag2_bagfile_information'])
-    assert order == list(expected['rosbag2_bagfile_information'])
+    start, duration = {'nanoseconds_since_epoch': 0}, {'nanoseconds': 9}
+    topic = {
+        'name': '/data',
+        'type': 'std_msgs/msg/Float64',
+        'serialization_format': 'cdr',
+        'offered_qos_profiles': yaml.safe_load(QOS),
+        'type_description_hash': 'RIHS01_705ba9c3d1a09df43737eb67095534de'
+        '36fd426c0587779bda2bc51fe790182a',
+    }
+    part = {'path': 'test_0.mcap', 'starting_time': start, 'duration': duration}
+    expected = {
+        'version': 9,
+        'storage_identifier': 'mcap',
+        'duration': duration,
+        'starting_time': start,
+        'message_count': 10,
+        'topics_with_message_count': [{'topic_metadata': topic, 'message_count': 10}],
+        'compression_format': '',
+        'compression_mode': '',
+        'relative_file_paths': ['test_0.mcap'],
+        'files': [part | {'message_count': 10}],
+        'custom_data': {'seed': '0'},
+        'ros_distro': 'jazzy',
+    }
+    said = yaml.safe_load(text)['rosbag2_bagfile_information']
+    assert said == expected and list(said) == list(expected)
     assert sorted(os.listdir(folder)) == ['metadata.yaml', 'test_0.mcap']
 
 
@@ -279,9 +213,6 @@ def test_never_overwrites(tmp_path):
 
 
 def test_misuse_is_refused(tmp_path):
-    with pytest.raises(InvalidInput, match="'seed': 0 is not allowed: key and value must be text"):
-        BagWriter(tmp_path / 'trial', {'seed': 0})
-    assert not (tmp_path / 'trial').exists()
     writer = BagWriter(tmp_path / 'trial')
     writer.add_topic('/data', 'std_msgs/msg/Float64')
     with pytest.raises(BagError, match='has topic /data already'):
@@ -290,7 +221,8 @@ def test_misuse_is_refused(tmp_path):
         writer.write('/other', b'', 0)
     with pytest.raises(InvalidInput, match='-1 ns is not allowed: at least 0 ns'):
         writer.write('/data', b'', -1)
-    writer.close({'outcome': 'done'})
+    writer.describe({'outcome': 'done'})
+    writer.close()
     writer.close()
     assert BagReader(tmp_path / 'trial').custom_data == {'outcome': 'done'}
     for call in (
@@ -300,59 +232,6 @@ def test_misuse_is_refused(tmp_path):
     ):
         with pytest.raises(BagError, match='closed'):
             call()
-
-
-def test_a_killed_writer_leaves_a_readable_start(tmp_path):
-    folder = tmp_path / 'trial'
-    program = f"""
-        import os
-        from rclpy.serialization import serialize_message
-        from geometry_msgs.msg import WrenchStamped
-        from ros_pad.bags import BagWriter
-        writer = BagWriter({str(folder)!r}, {{'seed': '3'}})
-        writer.add_topic('/wrench', 'geometry_msgs/msg/WrenchStamped')
-        message = WrenchStamped()
-        for number in range(5000):
-            message.wrench.force.z = float(number)
-            writer.write('/wrench', serialize_message(message), number)
-        os._exit(9)
-    """
-    result = subprocess.run([sys.executable, '-c', textwrap.dedent(program)], check=False)
-    assert result.returncode == 9
-    with pytest.warns(UserWarning, match='trial_0.mcap was not closed; [0-9]+ messages can'):
-        reader = BagReader(folder)
-    assert reader.problem is not None
-    # At most the last chunk, and bytes that were not written to the file yet, are lost.
-    assert 5000 - 2 * 64 * 1024 // 100 < reader.message_count < 5000
-    assert reader.custom_data == {'seed': '3'}
-    values = [message.wrench.force.z for _, message, _ in reader.messages()]
-    assert values == [float(number) for number in range(reader.message_count)]
-    metadata = yaml.safe_load((folder / 'metadata.yaml').read_text())
-    (topic,) = metadata['rosbag2_bagfile_information']['topics_with_message_count']
-    assert topic['topic_metadata']['name'] == '/wrench'
-
-
-def test_messages_reach_the_disk_while_the_bag_is_open(tmp_path, monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(time, 'monotonic', lambda: now[0])
-    writer = BagWriter(tmp_path / 'trial')
-    writer.add_topic('/data', 'std_msgs/msg/Float64')
-
-    def on_disk():
-        with warnings.catch_warnings():
-            warnings.simplefilter('ignore')
-            return BagReader(tmp_path / 'trial').message_count
-
-    for number in range(10):
-        writer.write('/data', serialize_message(Float64()), number)
-    assert on_disk() == 1  # the first message is written at once
-    now[0] += 1.01
-    writer.write('/data', serialize_message(Float64()), 10)
-    assert on_disk() == 11
-    writer.write('/data', serialize_message(Float64()), 11)
-    writer.flush()
-    assert on_disk() == 12
-    writer.close()
 
 
 def test_a_full_disk_reports_how_much_is_saved(tmp_path):
@@ -428,7 +307,7 @@ def test_a_damaged_chunk_is_an_error(recorded):
     middle = chunk.chunk_start_offset + chunk.chunk_length // 2
     content[middle : middle + 40] = bytes(40)
     path.write_bytes(content)
-    with pytest.raises(BagError, match=f'is damaged at byte {chunk.chunk_start_offset}'):
+    with pytest.raises(BagError, match='is damaged: one of its chunks'):
         list(BagReader(folder).messages())
 
 
@@ -489,13 +368,11 @@ def value_of(message, path):
     return message
 
 
-@pytest.mark.parametrize('size', [1, 100, 10_000])
-def test_tables_are_those_of_the_messages(recorded, monkeypatch, size):
-    monkeypatch.setattr('ros_pad.bags.reader._BATCH', size)
+def test_tables_are_those_of_the_messages(recorded):
     folder, written = recorded
     shares = []
-    tables = BagReader(folder).tables(PATHS, shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    _, tables = BagReader(folder).read({}, PATHS, shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0 and len(shares) > 10
     expected = expected_values(written)
     for topic, (times, values) in tables.items():
         assert times.tolist() == [at for name, _, at in expected if name == topic]
@@ -505,38 +382,28 @@ def test_tables_are_those_of_the_messages(recorded, monkeypatch, size):
         assert values.dtype == float
 
 
-def bag_of_records(folder, count=50, odd=None):
-    """Write estimates of legs 3 and 1 and pressures in turn; return the blocks written."""
-    written = {'/feet/estimate': [], '/feet/pressure': []}
-    wires = {f'/feet/{kind.name}': Wire(kind, (3, 1)) for kind in (ESTIMATE, PRESSURE)}
-    with BagWriter(folder) as writer:
-        for topic in wires:
+@pytest.mark.parametrize('several', [1, 3])
+def test_records_are_those_written_in_their_order(tmp_path, several):
+    """Estimates of legs 3 and 1 and pressures in turn, one or several in a message."""
+    kinds = {f'/feet/{kind.name}': kind for kind in (ESTIMATE, PRESSURE)}
+    written = dict.fromkeys(kinds, b'')
+    with BagWriter(tmp_path / 'trial') as writer:
+        for topic in kinds:
             writer.add_topic(topic, 'sensor_msgs/msg/JointState')
-        for number in range(count):
-            for topic, wire in wires.items():
-                rows = wire.kind.rows(1, 2)
+        for number in range(0, 60, several):
+            for topic, kind in kinds.items():
+                rows = kind.rows(several, 2)
                 rows['detail'] = number
-                block = Block(np.array([10**9 + number]), rows)
-                data = odd if odd and number == 7 else wire.encode(block)
-                writer.write(topic, data, 20_000_000 * number)
-                written[topic].append(block)
-    return written
-
-
-@pytest.mark.parametrize('size', [1, 5000, 1 << 23])
-def test_records_are_those_written_in_their_order(tmp_path, monkeypatch, size):
-    monkeypatch.setattr('ros_pad.bags.storage._BATCH_SIZE', size)
-    written = bag_of_records(tmp_path / 'trial')
-    shares = []
-    kinds = {'/feet/estimate': ESTIMATE, '/feet/pressure': PRESSURE, '/feet/sample': SAMPLE}
-    found = BagReader(tmp_path / 'trial').records(kinds, shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1.0
-    assert set(found) == set(written)
+                block = Block(10**9 + number + np.arange(several), rows)
+                writer.write(topic, Wire(kind, (3, 1)).encode(block), 20_000_000 * number)
+                written[topic] += rows.tobytes()
+    found = BagReader(tmp_path / 'trial').records(kinds | {'/feet/sample': SAMPLE})
+    assert set(found) == set(kinds)
     for topic, (legs, times, block) in found.items():
         assert legs == (3, 1)
-        assert times.tolist() == [20_000_000 * number for number in range(50)]
-        assert block.stamps.tolist() == [10**9 + number for number in range(50)]
-        assert block.rows.tobytes() == b''.join(each.rows.tobytes() for each in written[topic])
+        assert times.tolist() == [20_000_000 * (n - n % several) for n in range(60)]
+        assert block.stamps.tolist() == [10**9 + number for number in range(60)]
+        assert block.rows.tobytes() == written[topic]
 
 
 @pytest.mark.parametrize('kind', ['short', 'big_endian_xml', 'field'])
@@ -548,27 +415,10 @@ def test_values_that_cannot_be_read_are_an_error(tmp_path, kind):
         for time_ns, data in enumerate((good, good, bad, bad)):
             writer.write('/wrench', data, time_ns)
     path = 'wrench.force.w' if kind == 'field' else 'wrench.torque.z'
-    words = 'topic /wrench: ' if kind == 'field' else '/wrench at 2 ns cannot be decoded'
+    words = 'message on /wrench: ' if kind == 'field' else '/wrench at 2 ns cannot be decoded'
     reader = BagReader(tmp_path / 'trial')
     with pytest.raises(BagError, match=words):
         reader.tables({'/wrench': (path,)})
-
-
-def test_a_record_that_is_longer_than_its_chunk_is_an_error(tmp_path):
-    path = tmp_path / 'bag.mcap'
-    with path.open('wb') as stream:
-        writer = Writer(stream, enable_crcs=False, compression=CompressionType.NONE)
-        writer.start('ros2')
-        schema = writer.register_schema('std_msgs/msg/Float64', 'ros2msg', b'float64 data')
-        channel = writer.register_channel('/data', 'cdr', schema)
-        writer.add_message(channel, 0, bytes(12), 0)
-        writer.finish()
-    opcode, length = b'\x05', (22 + 12).to_bytes(8, 'little')
-    content = path.read_bytes()
-    assert content.count(opcode + length) == 1
-    path.write_bytes(content.replace(opcode + length, opcode + b'\xff' * 8))
-    with pytest.raises(BagError, match='is damaged: a record is longer than its chunk'):
-        list(BagReader(path).messages())
 
 
 def test_what_is_no_bag_is_refused(tmp_path):
@@ -598,29 +448,3 @@ def test_what_is_no_bag_is_refused(tmp_path):
     refused(text.replace('trial_0', 'trial_7'), 'its file trial_7.mcap is missing')
     shutil.copy(folder / 'trial_0.mcap', tmp_path / 'alone.mcap')
     assert BagReader(tmp_path / 'alone.mcap').message_count == 10
-
-
-def write_mcap(path, definition=b'float64 data\n', schema_id=None, channel_id=None):
-    """Write a file with one topic and one message; the options put errors into it."""
-    with path.open('wb') as stream:
-        writer = Writer(stream, enable_crcs=False)
-        writer.start(profile='ros2')
-        schema = writer.register_schema('std_msgs/msg/Float64', 'ros2msg', definition)
-        channel = writer.register_channel('/a', 'cdr', schema_id or schema)
-        writer.add_message(channel_id or channel, 1, bytes(12), 1)
-        writer.finish()
-
-
-def test_aliases_to_what_a_reader_leaves_out_of_the_metadata(tmp_path):
-    folder = one_bag(tmp_path / 'trial', custom_data={'seed': '3'})
-    path = folder / 'metadata.yaml'
-    content = yaml.safe_load(path.read_text())
-    information = content['rosbag2_bagfile_information']
-    # In YAML, the second mention of the same list is an alias of the first.
-    information['topics_with_message_count'] = information['relative_file_paths']
-    del information['relative_file_paths']
-    information['relative_file_paths'] = information['topics_with_message_count']
-    path.write_text(yaml.safe_dump(content, sort_keys=False))
-    assert '*id' in path.read_text()
-    reader = BagReader(folder)
-    assert (reader.message_count, reader.custom_data) == (10, {'seed': '3'})

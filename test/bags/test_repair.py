@@ -80,7 +80,10 @@ def test_a_recorder_that_is_killed_loses_at_most_a_second(tmp_path):
     process.send_signal(signal.SIGKILL)
     last = [2_600, *map(int, process.stdout.read().split('\n')[:-1])][-1]
     process.wait()
+    with pytest.warns(UserWarning, match=r'trial_0.mcap was not closed.*; [0-9]+ messages can'):
+        torn = BagReader(folder)
     found = recovery.repair(folder, tmp_path / 'whole')
+    assert torn.problem and torn.message_count == found.messages
     assert not found.closed
     reader = BagReader(tmp_path / 'whole')
     assert reader.problem is None

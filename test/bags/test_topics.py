@@ -22,7 +22,7 @@ from ros_pad.bags.topics import (
 )
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-TOPICS = [each for each in vars(topics).values() if isinstance(each, Topic)]
+TOPICS = {*OF_LEGS, *(each for each in vars(topics).values() if isinstance(each, Topic))}
 
 
 def test_the_documentation_has_every_topic_with_type_and_unit():

@@ -172,26 +172,3 @@ def test_any_bytes_are_a_record_or_refused(data):
             pass
         else:
             assert function is legs_of or len(wire.decode(given_bytes).rows) > 0
-
-
-@pytest.mark.parametrize('kind', KINDS, ids=lambda kind: kind.name)
-@pytest.mark.parametrize('way', ['ours', 'several', 'another', 'none'])
-def test_a_table_is_what_the_messages_are_one_by_one(kind, way):
-    """Of equal messages, and where blocks or messages of others are among them."""
-    wire = Wire(kind, LEGS)
-    messages = [wire.encode(block_of(kind, first_ns=-(10**9) + n, seed=n)) for n in range(20)]
-    if way == 'several':
-        messages[7] = wire.encode(block_of(kind, records=3))
-    if way == 'another':
-        messages[7] = others([f'leg_4/{kind.columns[0]}'], [5.0], big=True)
-    if way == 'none':
-        messages = []
-    table = wire.table(messages)
-    blocks = [wire.decode(each) for each in messages]
-    stamps = [stamp for block in blocks for stamp in block.stamps.tolist()]
-    assert table.stamps.tolist() == stamps
-    assert table.rows.tobytes() == b''.join(block.rows.tobytes() for block in blocks)
-    assert table.rows.shape == (len(stamps), 2)
-    if messages:
-        with pytest.raises(BadMessage):
-            wire.table([*messages[:-1], messages[-1][:-30]])

@@ -17,10 +17,7 @@ from ros_pad.trials.replay import replay
 
 LEGS = (1, 2, 3, 4, 5, 6)
 SAMPLES = 984  # of 1000: the first 16 wait for a calm robot
-SERIES = (
-    'time', 'slow_time', 'pressure', 'setpoint', 'wet_probability', 'friction', 'margin',
-    'slip_speed', 'slipping', 'dome', 'doubt', 'odom',
-)  # fmt: skip
+SERIES = ('time', 'slow_time', 'slow', 'odom')
 
 
 def scene_of(cycles):

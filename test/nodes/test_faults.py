@@ -64,7 +64,7 @@ def test_each_fault_is_reported_within_a_second_and_the_others_go_on(tmp_path):
     scene = scene_with(tmp_path, 8, faults)
     trial = composed.run(scene, 'oracle', bag=tmp_path / 'bag')
     rows = health(tmp_path / 'bag')
-    time, commanded = trial.slow_time, trial.setpoint > 0.0
+    time, commanded = trial.slow_time, trial.slow['setpoint'] > 0.0
 
     def turned(column, to, start=0.0):
         """Return the first time, s, after ``start`` at which a leg is commanded to switch."""
@@ -95,13 +95,13 @@ def test_each_fault_is_reported_within_a_second_and_the_others_go_on(tmp_path):
     assert fault_lines(trial.metrics.faults)[0].startswith('Leg 1, from ')
     # A foot with a fault goes flat, or keeps the pressure that the pad has.
     known = {leg: first_error(rows[leg])[0] for leg in visible}
-    assert not trial.dome[time > known[1], 0].any()
-    assert not trial.dome[time > known[2] + 1.5, 1].any()
-    assert trial.dome[time > known[4], 3].all()
-    assert not trial.setpoint[(time > known[1] + 1.0) & (time < known[1] + 4.0), 0].any()
+    assert not trial.slow['dome'][time > known[1], 0].any()
+    assert not trial.slow['dome'][time > known[2] + 1.5, 1].any()
+    assert trial.slow['dome'][time > known[4], 3].all()
+    assert not trial.slow['setpoint'][(time > known[1] + 1.0) & (time < known[1] + 4.0), 0].any()
     # The foot without a fault switches as in a trial without faults.
     sound = run(dataclasses.replace(scene, faults=()), 'oracle')
-    assert np.argwhere(np.diff(trial.dome[:, 4])).size > 1
+    assert np.argwhere(np.diff(trial.slow['dome'][:, 4])).size > 1
     switches = [time[np.flatnonzero(np.diff(each.dome[:, 4]))] for each in (trial, sound)]
     assert switches[0] == pytest.approx(switches[1], abs=0.1)
     assert sound.metrics.faults == []

@@ -19,12 +19,11 @@ from ros_pad.reports.view import view_of, window_of
 from ros_pad.simulation import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import conditions, run
-from ros_pad.trials.trial import Metrics, Trial
+from ros_pad.trials.trial import SLOW, Metrics, Trial
 
 # HTML elements without a closing tag.
 VOID = {'meta', 'img', 'br', 'hr', 'link', 'input'}
-SLOW = ('slow_time', 'pressure', 'setpoint', 'wet_probability', 'friction', 'margin',
-        'slip_speed', 'slipping', 'dome')  # fmt: skip
+CONTROL = ('slow_time', 'slow')
 FAST = ('time', 'body', 'force', 'position')
 
 
@@ -98,7 +97,11 @@ def made_up(per_cycle=0.12, policy='adaptive'):
         np.stack([place[:, 0], np.full(2000, side), np.zeros(2000)], axis=1)
         for side in (0.1, -0.1)
     ], axis=1)  # fmt: skip
-    dome = np.stack([np.zeros(1000, dtype=bool), slow > 10.0], axis=1)
+    known = np.zeros((1000, 2), SLOW)
+    known['dome'][:, 1] = slow > 10.0
+    known['pressure'] = known['setpoint'] = np.where(known['dome'], 60e3, 0.0)
+    known['wetness'] = np.where(slow[:, None] > 10.5, 0.9, 0.1)
+    known['doubt'] = -1
     return Trial(
         scene='made_up',
         policy=policy,
@@ -110,14 +113,7 @@ def made_up(per_cycle=0.12, policy='adaptive'):
         force=force,
         position=position,
         slow_time=slow,
-        pressure=np.where(dome, 60e3, 0.0),
-        setpoint=np.where(dome, 60e3, 0.0),
-        wet_probability=np.where(slow[:, None] > 10.5, 0.9, 0.1) * np.ones((1, 2)),
-        friction=np.full((1000, 2), 0.5),
-        margin=np.full((1000, 2), 0.2),
-        slip_speed=np.zeros((1000, 2)),
-        slipping=np.zeros((1000, 2), dtype=bool),
-        dome=dome,
+        slow=known,
         floor=Floor(np.array([[False, True, True, True]]), 1.0, (0.0, -0.5), 3e-4),
         metrics=metrics(per_cycle),
         settings={
@@ -266,9 +262,9 @@ def test_window_and_omissions(tmp_path):
 
 def test_each_leg_has_its_own_series():
     trial = made_up()
-    trial.slip_speed = np.stack([0.001 * trial.slow_time, 0.01 * trial.slow_time], axis=1)
-    trial.wet_probability = np.stack([0.1 + 0.0 * trial.slow_time] * 2, axis=1)
-    trial.wet_probability[:, 1] = 0.7
+    trial.slow['slip_speed'] = np.stack([0.001 * trial.slow_time, 0.01 * trial.slow_time], axis=1)
+    trial.slow['wetness'] = np.stack([0.1 + 0.0 * trial.slow_time] * 2, axis=1)
+    trial.slow['wetness'][:, 1] = 0.7
     figures = report.drawn(trial)
     start, end = window_of(view_of(trial))
     near = (trial.slow_time >= start) & (trial.slow_time <= end)
@@ -279,12 +275,12 @@ def test_each_leg_has_its_own_series():
         assert force.get_ylabel() == f'leg {trial.legs[column]}'
         np.testing.assert_array_equal(force.lines[0].get_ydata(), trial.force[fast, column, 2])
         measured, wanted = (line.get_ydata() for line in pressure.lines)
-        np.testing.assert_array_equal(measured, 1e-3 * trial.pressure[near, column])
-        np.testing.assert_array_equal(wanted, 1e-3 * trial.setpoint[near, column])
-        assert set(wetness.lines[0].get_ydata()) == {trial.wet_probability[0, column]}
+        np.testing.assert_array_equal(measured, 1e-3 * trial.slow['pressure'][near, column])
+        np.testing.assert_array_equal(wanted, 1e-3 * trial.slow['setpoint'][near, column])
+        assert set(wetness.lines[0].get_ydata()) == {trial.slow['wetness'][0, column]}
         np.testing.assert_array_equal(slip.lines[0].get_ydata(),
-                                      1e3 * trial.slip_speed[near, column])  # fmt: skip
-        assert set(whole[column].lines[0].get_ydata()) == {trial.wet_probability[0, column]}
+                                      1e3 * trial.slow['slip_speed'][near, column])  # fmt: skip
+        assert set(whole[column].lines[0].get_ydata()) == {trial.slow['wetness'][0, column]}
 
 
 def without(names):
@@ -295,23 +291,23 @@ def without(names):
 def all_nan(names):
     trial = made_up()
     nan = {name: np.full_like(getattr(trial, name), np.nan) for name in names}
-    return dataclasses.replace(trial, **nan)
+    for name in ('pressure', 'setpoint', 'wetness', 'slip_speed'):
+        trial.slow[name] = np.nan
+    return dataclasses.replace(trial, settings={}, **nan)
 
 
 POOR = {
     'robot': lambda: dataclasses.replace(
         made_up(), scene='', policy='', fidelity='', floor=None, metrics=None, settings={}
     ),
-    'no estimates': lambda: without(SLOW),
+    'no estimates': lambda: without(CONTROL),
     'no wrenches': lambda: without(FAST),
     'nothing': lambda: dataclasses.replace(
-        without(SLOW + FAST), metrics=None, floor=None, settings={}
+        without(CONTROL + FAST), metrics=None, floor=None, settings={}
     ),
-    'all unknown': lambda: dataclasses.replace(
-        all_nan(('body', 'force', 'position', 'pressure', 'setpoint', 'wet_probability',
-                 'slip_speed')), settings={}),
+    'all unknown': lambda: all_nan(('body', 'force', 'position')),
     'one sample': lambda: dataclasses.replace(
-        made_up(), **{name: getattr(made_up(), name)[:1] for name in FAST + SLOW},
+        made_up(), **{name: getattr(made_up(), name)[:1] for name in FAST + CONTROL},
     ),
 }  # fmt: skip
 
@@ -339,8 +335,8 @@ def test_unobservable_ground_is_counted_by_stance():
     """Leg 1 has ten stances that end at odd seconds, leg 2 ten at even seconds, five domed."""
     trial = made_up()
     assert report.unobservable_shares(trial, 3.0) == ''
-    trial.doubt = np.where(trial.dome, DOUBTS.index('domed'), 0)
-    trial.doubt[trial.slow_time < 2.0, :] = DOUBTS.index('not pulled')
+    trial.slow['doubt'] = np.where(trial.slow['dome'], DOUBTS.index('domed'), 0)
+    trial.slow['doubt'][trial.slow_time < 2.0, :] = DOUBTS.index('not pulled')
     text = report.unobservable_shares(trial, 3.0)
     ends = [*range(1, 20, 2), *range(2, 21, 2)]
     not_pulled = sum(end <= 2 for end in ends)
@@ -352,17 +348,15 @@ def test_unobservable_ground_is_counted_by_stance():
 
 def test_conditions_have_values_and_units(walk):
     rows = dict(conditions.rows(walk))
-    assert 'recorded' in rows['conditions']
     assert f'numpy {np.__version__}' in rows['versions'] and 'python 3.' in rows['versions']
-    assert rows['scene'].startswith('hexapod_patches; ') and '3 gait cycles' in rows['scene']
-    assert rows['robot'].startswith('ch3r') and 'mass 2.09 kg' in rows['robot']
-    assert rows['foot'].startswith('large37') and 'pad stiffness 40 N/m' in rows['foot']
-    assert 'wet fraction 0.45' in rows['floor'] and 'viscosity 0.001 Pa s' in rows['floor']
-    assert 'weight 9 N' in rows['towed load']
-    (noise,) = (value for name, value in rows.items() if name.startswith('sensors'))
-    for value in ('250 Hz', '0.03 N', '0.00015 m', '0 N m'):
-        assert value in noise
-    assert 'hose diameter 0.004 m' in rows['regulator and hose']
+    assert rows['scene'] == 'hexapod_patches' and rows['gait cycles'] == '3'
+    assert rows['robot'] == 'ch3r' and 'mass 2.09' in rows['body']
+    assert 'pad.stiffness 40.0' in rows['foot'] and 'ceiling 90000.0' in rows['foot']
+    assert 'wet_fraction 0.45' in rows['floor'] and 'viscosity 0.001' in rows['floor']
+    assert 'weight 9' in rows['tow']
+    for value in ('rate 250', 'force 0.03', 'position 0.00015'):
+        assert value in rows['sensors']
+    assert 'hose_diameter 0.004' in rows['regulator']
     assert rows['command to repeat it'] == (
         'pad run hexapod_patches --policy adaptive --seed 0 --fidelity L2 --cycles 3'
         ' --foot large37'

@@ -57,10 +57,10 @@ def test_what_was_walked_is_read_in_order(folder):
     assert found.sweep.scenes == ['leg_wet_flat'] and found.sweep.policies == ['flat', 'dome']
     assert found.sweep.seeds == list(range(8))
     assert list(found.sweep.parameters) == ['body.rolling_drag', 'cycles']
-    assert found.sweep.parameters['body.rolling_drag'] == [0.25, 0.5]
+    assert found.sweep.parameters['body.rolling_drag'] == [0.5, 0.25]
     assert len(found.rows) == 32
     labels = [(r['body.rolling_drag'], r['policy'], r['seed']) for r in found.rows]
-    assert labels == [(d, p, s) for d in (0.25, 0.5) for p in ('flat', 'dome') for s in range(8)]
+    assert labels == [(d, p, s) for d in (0.5, 0.25) for p in ('flat', 'dome') for s in range(8)]
     assert {tuple(r) for r in found.rows} == {tuple(found.rows[0])}
 
 

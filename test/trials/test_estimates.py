@@ -9,7 +9,6 @@ import pytest
 from ros_pad.estimation import doubt
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
 from studies.closed_loop import loops
@@ -27,21 +26,20 @@ def walked(policy, seed, cycles=12):
     """Return arrays (samples, feet) of true values and estimates."""
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=cycles)
     loop = ClosedLoop(scene, policy, seed, 'L2')
-    log = TrialLog(scene, policy, seed, 'L2')
     rows = [
         [(foot.force[2], foot.slip_speed, foot.wet) for foot in loop.robot.feet]
-        for _ in loops.samples(loop, scene, log)
+        for _ in loop.walk()
     ]
     assert loop.robot.verdict is None
     tuning, load = tuning_for(scene), scene.expected_load
     stage = EstimationStage(scene.foot, load, tuning, scene.legs, loop.period_ns)
-    told = loops.estimated(stage, log.records)
+    told = loops.estimated(stage, loop.log.records)
     assert 'axes' not in {doubt.kind(each) for each in np.unique(told.rows['doubt'])}
     true = np.moveaxis(np.array(rows, dtype=float), 2, 0)
     series = dict(zip(('load', 'speed', 'wet'), true, strict=True))
     series |= {'alarm': told.rows['slipping'], 'wetness': told.rows['wetness']}
-    series |= {'pressure': loops.pressures(log.records, told.stamps)}
-    series |= {'standing': log.records.sample.rows['force'][..., 2] > tuning.load_gate * load}
+    series |= {'pressure': loops.pressures(loop.log.records, told.stamps)}
+    series |= {'standing': loop.log.records.sample.rows['force'][..., 2] > tuning.load_gate * load}
     return {name: each[round(scene.settle / PERIOD) :] for name, each in series.items()}
 
 

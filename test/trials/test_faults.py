@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import re
+import types
 
 import numpy as np
 import pytest
@@ -15,7 +16,6 @@ from ros_pad.trials import run
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.sweep.table import columns_of
 from ros_pad.trials.trial import fault_lines
-from studies.closed_loop.loops import NoLog
 
 PATCHES = Scene.load('hexapod_patches')
 WALKS = (
@@ -42,7 +42,7 @@ def test_slow_hoses_are_remarked_on_and_no_fault(conductance):
     regulator = {'hose_diameter': 2e-3, 'hose_length': 1.0, 'hose_conductance': conductance}
     scene = dataclasses.replace(PATCHES, cycles=15, regulator=regulator)
     trial = run(scene, 'adaptive', seed=1, fidelity='L1')
-    assert trial.dome.any()
+    assert trial.slow['dome'].any()
     assert trial.metrics.faults == []
     assert sum(trial.metrics.underpressure) > 0
 
@@ -78,7 +78,7 @@ def test_a_walk_goes_on_with_a_fault(case, sound):
         # Other legs switch as without the fault, except for probes in place of leg 2.
         change = np.subtract(metrics.switches, sound.metrics.switches)[others]
         assert abs(change).max() <= 4
-        assert trial.dome[-1, others].sum() >= 4
+        assert trial.slow['dome'][-1, others].sum() >= 4
     assert json.loads(json.dumps(metrics.as_dict()))['faults'] == metrics.faults
     assert columns_of(trial)['faults'] == '; '.join(fault_lines(metrics.faults))
 
@@ -96,12 +96,25 @@ def test_a_foot_whose_position_is_no_number_is_vented_like_on_nodes(monkeypatch)
 
     monkeypatch.setattr(loop.sensors, 'sample', blinded)
     for _ in range(round(1.96 / 0.004)):
-        loop.tick(NoLog())
+        loop.tick()
     assert loop.pads[1] > 60e3
     for _ in range(round(0.4 / 0.004)):
-        loop.tick(NoLog())
+        loop.tick()
     assert loop.pads[1] == 0.0
     assert loop.pads[0] > 60e3
     assert re.search('estimate for 0.5 s; marker lost', loop.controller.fault(2))
     assert loop.controller.morphology(2) == 'flat'
     assert loop.controller.fault(1) == ''
+
+
+def test_pads_are_vented_when_commands_stop():
+    loop = ClosedLoop(dataclasses.replace(PATCHES, cycles=3), 'dome', 0, 'L1')
+    for _ in range(375):
+        loop.tick()
+    assert min(loop.pads) > 60e3
+    loop.pipeline = types.SimpleNamespace(process=lambda samples: (), tick=lambda now_ns: None)
+    for _ in range(250):
+        loop.tick()
+    now_ns = 625 * loop.period_ns
+    assert max(loop.supervision.read(now_ns, now_ns).rows[0]['pad']) < 1e3
+    loop.close()

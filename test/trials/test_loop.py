@@ -9,16 +9,12 @@ from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop as loop_module
 from ros_pad.trials import run
-from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
 from studies.closed_loop import loops
 
 PATCHES = Scene.load('hexapod_patches')
-SERIES = (
-    'time', 'body', 'force', 'position', 'slow_time', 'pressure', 'setpoint', 'wet_probability',
-    'friction', 'margin', 'slip_speed', 'slipping', 'dome',
-)  # fmt: skip
+SERIES = ('time', 'body', 'force', 'position', 'slow_time', 'slow')
 
 
 def short(cycles, kind=None):
@@ -40,24 +36,34 @@ def test_the_same_seed_is_the_same_trial_to_the_bit():
     scene = short(4)
     one, two = run(scene, 'adaptive', seed=5), run(scene, 'adaptive', seed=5)
     for name in SERIES:
-        assert np.array_equal(getattr(one, name), getattr(two, name)), name
+        assert getattr(one, name).tobytes() == getattr(two, name).tobytes(), name
     assert one.metrics == two.metrics
     assert np.array_equal(one.floor.wet_map, two.floor.wet_map)
+
+
+def test_another_seed_is_another_floor_and_other_noise():
+    walks = [ClosedLoop(short(1), 'flat', seed, 'L1') for seed in (1, 2)]
+    for loop in walks:
+        loop.tick()
+        loop.close()
+    one, other = ((loop.floor.wet_map, loop.log.records.sample.rows['force']) for loop in walks)
+    assert not np.array_equal(one[0], other[0])
+    assert not np.array_equal(one[1], other[1])
 
 
 @pytest.mark.parametrize('policy', ['flat', 'adaptive'])
 def test_set_points_follow_the_shapes_and_pressures_the_set_points(policy):
     trial = run(short(4), policy, seed=1)
-    assert np.array_equal(trial.setpoint > 0.0, trial.dome)
-    assert trial.setpoint.max() <= PATCHES.foot.ceiling
-    assert trial.dome.any() == (policy != 'flat')
-    assert trial.dome.all() == (policy == 'dome')
+    assert np.array_equal(trial.slow['setpoint'] > 0.0, trial.slow['dome'])
+    assert trial.slow['setpoint'].max() <= PATCHES.foot.ceiling
+    assert trial.slow['dome'].any() == (policy != 'flat')
+    assert trial.slow['dome'].all() == (policy == 'dome')
     # Half a second after a change a pad has its set-point, within the dead band.
     still = np.array([
-        (trial.setpoint[row - 25 : row + 1] == trial.setpoint[row]).all(axis=0)
-        for row in range(25, len(trial.setpoint))
+        (trial.slow['setpoint'][row - 25 : row + 1] == trial.slow['setpoint'][row]).all(axis=0)
+        for row in range(25, len(trial.slow['setpoint']))
     ])  # fmt: skip
-    off = abs(trial.pressure - trial.setpoint)[25:][still]
+    off = abs(trial.slow['pressure'] - trial.slow['setpoint'])[25:][still]
     assert len(off) > 100
     assert off.max() < 600.0
 
@@ -68,7 +74,7 @@ def test_shapes_never_change_in_stance():
     trial = run(scene, 'adaptive', seed=1)
     rows = np.searchsorted(trial.time, trial.slow_time - 1e-9)
     load = trial.force[rows, :, 2]
-    changed = np.diff(trial.setpoint, axis=0) != 0.0
+    changed = np.diff(trial.slow['setpoint'], axis=0) != 0.0
     assert changed.sum() > 5
     assert (load[1:][changed] < 0.3 * scene.expected_load).all()
 
@@ -81,42 +87,21 @@ def test_what_is_unknown_is_refused_by_name():
         run('hexapod_patch')
     with pytest.raises(InvalidInput, match="policy = 'brave'"):
         run(short(1), 'brave')
-    with pytest.raises(InvalidInput, match="policy = ''"):
-        run(short(1), '')
-    with pytest.raises(InvalidInput, match="fidelity = 'L9'"):
-        run(short(1), fidelity='L9')
+    with pytest.raises(InvalidInput, match='seed = -1'):
+        run(short(1), seed=-1)
     with pytest.raises(InvalidInput, match=r"fidelity = 'L0'.* ch3r"):
         run(short(1), fidelity='L0')
-
-
-@pytest.mark.parametrize('seed', [-1, 1.5, True])
-def test_a_seed_is_a_whole_number(seed):
-    with pytest.raises(InvalidInput, match='seed = '):
-        run(short(1), seed=seed)
 
 
 def test_estimators_can_be_tuned():
     scene = short(3)
     plain, told = (run(scene, 'flat', tuning=each) for each in (None, tuning_for(scene)))
-    assert np.array_equal(plain.wet_probability, told.wet_probability)
+    assert np.array_equal(plain.slow['wetness'], told.slow['wetness'])
     sure = run(scene, 'flat', tuning=dataclasses.replace(tuning_for(scene), wet_prior=0.9))
     # Before the first step the estimate is the prior.
-    assert plain.wet_probability[0] == pytest.approx(0.5, abs=0.02)
-    assert sure.wet_probability[0] == pytest.approx(0.9, abs=0.02)
+    assert plain.slow['wetness'][0] == pytest.approx(0.5, abs=0.02)
+    assert sure.slow['wetness'][0] == pytest.approx(0.9, abs=0.02)
     assert np.array_equal(plain.force, sure.force)  # a fixed morphology ignores estimates
-
-
-@pytest.mark.parametrize(
-    ('policy', 'parameters', 'message'),
-    [
-        ('adaptive', {'wet_abov': 0.5}, "'wet_abov' is not allowed: .* Did you mean 'wet_above'"),
-        ('adaptive', {'wet_above': 1.5}, 'wet_above = 1.5 .* to 1'),
-        ('flat', {'wet_above': 0.5}, "policy = 'flat' has no parameters, but wet_above"),
-    ],
-)
-def test_parameters_that_a_policy_has_not_are_refused(policy, parameters, message):
-    with pytest.raises(InvalidInput, match=message):
-        run(short(1), policy, policy_parameters=parameters)
 
 
 @pytest.fixture
@@ -190,17 +175,16 @@ def watched(policy, seed, cycles=20):
     stance without doubt (estimated wet, wet)."""
     scene = short(cycles)
     loop = ClosedLoop(scene, policy, seed, 'L1')
-    log = TrialLog(scene, policy, seed, 'L1')
     true = np.array([
         [(*foot.force, foot.grip, foot.wet) for foot in loop.robot.feet]
-        for _ in loops.samples(loop, scene, log)
+        for _ in loop.walk()
     ])  # fmt: skip
     x, y, load, grip, wet = np.moveaxis(true, 2, 0)
     tuning, expected = tuning_for(scene), scene.expected_load
     stage = EstimationStage(scene.foot, expected, tuning, scene.legs, loop.period_ns)
-    stamps, told = loops.estimated(stage, log.records)
-    domed = loops.pressures(log.records, stamps) > 1000.0
-    stands = log.records.sample.rows['force'][..., 2] > tuning.load_gate * expected
+    stamps, told = loops.estimated(stage, loop.log.records)
+    domed = loops.pressures(loop.log.records, stamps) > 1000.0
+    stands = loop.log.records.sample.rows['force'][..., 2] > tuning.load_gate * expected
     # Before the robot walks the ground is unobservable.
     walks = (1e-9 * stamps > scene.settle + 0.3)[:, None]
     use = stands & walks & (load > 0.0)

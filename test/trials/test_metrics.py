@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
-import json
-import types
 
 import numpy as np
 import pytest
 
-from ros_pad.control import FootFault
-from ros_pad.control.faults import Kind
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import Trial, run
-from ros_pad.trials.metrics import stance_ends, summarise, time_to, wet_accuracy
+from ros_pad.trials.metrics import stance_ends, time_to, wet_accuracy
+from ros_pad.trials.trial import SLOW
 
 SCENE = Scene.load('hexapod_patches')
 GATE = 2.0  # N
@@ -28,16 +25,16 @@ def written(load, x, wet_probability, pressure=None, floor=None):
     belief = np.array(wet_probability, dtype=float)
     steps = len(belief)
     assert steps == (samples + 1) // 2
-    zeros = np.zeros((steps, legs))
     force, position = np.zeros((samples, legs, 3)), np.zeros((samples, legs, 3))
     force[:, :, 2], position[:, :, 0] = load, x
+    slow = np.zeros((steps, legs), SLOW)
+    slow['wetness'] = belief
+    if pressure is not None:
+        slow['pressure'] = pressure
     return Trial(
         scene='written', policy='flat', fidelity='L1', seed=0, legs=tuple(range(1, legs + 1)),
-        time=0.1 * np.arange(1, samples + 1), body=np.zeros((samples, 3)),
-        force=force, position=position, slow_time=0.1 * np.arange(1, samples + 1, 2),
-        pressure=zeros if pressure is None else np.array(pressure, dtype=float),
-        setpoint=zeros, wet_probability=belief, friction=zeros, margin=zeros, slip_speed=zeros,
-        slipping=zeros > 1.0, dome=zeros > 1.0, floor=floor,
+        time=0.1 * np.arange(1, samples + 1), body=np.zeros((samples, 3)), force=force,
+        position=position, slow_time=0.1 * np.arange(1, samples + 1, 2), slow=slow, floor=floor,
     )  # fmt: skip
 
 
@@ -78,41 +75,6 @@ def test_accuracy_is_over_all_legs_and_stances():
     assert wet_accuracy(trial, GATE) == 2 / 4
 
 
-def test_a_summary_has_the_values_of_the_robot():
-    trial = one_leg([0.9] * 5)
-    feet = [types.SimpleNamespace(slip_path=0.25, overload_time=0.5)]
-    robot = types.SimpleNamespace(
-        body=(3.0, -0.2, 0.1), time=SCENE.settle + 20.0 * SCENE.gait.cycle, feet=feet,
-        dissipation=7.0, verdict=None,
-    )  # fmt: skip
-    fault = FootFault(1, 0.5, None, Kind.STUCK(5e3))
-    controller = types.SimpleNamespace(
-        switches={1: 4}, refusals={1: 'too heavy'}, faults=[fault], underpressure={1: 2}
-    )
-    metrics = summarise(SCENE, trial, robot, controller)
-    assert metrics.distance_m == 3.0
-    assert metrics.cycles == pytest.approx(20.0)
-    assert metrics.distance_per_cycle_m == pytest.approx(0.15)
-    assert (metrics.lateral_drift_m, metrics.yaw_drift_rad) == (-0.2, 0.1)
-    assert metrics.slip_path_m == [0.25]
-    assert metrics.overload_s == [0.5]
-    assert metrics.switches == [4]
-    assert metrics.dissipation_j == 7.0
-    assert metrics.verdict is None
-    said = json.loads(json.dumps(metrics.as_dict()))
-    assert said['switches'] == [4]
-    assert said['faults'] == [
-        {
-            'leg': 1,
-            'start': 0.5,
-            'end': None,
-            'kind': 'stuck',
-            'reason': 'stuck: 5.0 kPa, neither fills nor vents',
-        }
-    ]
-    assert said['underpressure'] == [2]
-
-
 def test_metrics_agree_with_the_series():
     scene = dataclasses.replace(SCENE, cycles=8)
     trial = run(scene, 'adaptive', seed=1)
@@ -122,7 +84,7 @@ def test_metrics_agree_with_the_series():
     assert metrics.yaw_drift_rad == trial.body[-1, 2]
     assert metrics.duration_s == pytest.approx(scene.duration)
     assert metrics.cycles == pytest.approx(8.0)
-    changes = np.sum(trial.dome[1:] != trial.dome[:-1], axis=0)
+    changes = np.sum(trial.slow['dome'][1:] != trial.slow['dome'][:-1], axis=0)
     assert metrics.switches == changes.tolist()
     assert sum(metrics.switches) > 0
     # Slip paths are at least the advance of loaded markers, except for the shear of pads.

@@ -12,7 +12,6 @@ from ros_pad import workers
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop, others
 from ros_pad.trials.node_settings import tuning_for
-from ros_pad.trials.others import Others
 
 SCENE = dataclasses.replace(Scene.load('hexapod_patches'), cycles=2)
 POLICIES = ('flat', 'dome', 'oracle')
@@ -47,22 +46,12 @@ def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, 
     tuning = tuning_for(SCENE, 'markers')
     tuning = dataclasses.replace(tuning, scale_flat_wet=3.0, scale_sd_flat_wet=0.01)
     monkeypatch.setattr(workers, 'cores', lambda: cores)
-    with Others(SCENE, POLICIES, 1, 'L1', tuning=tuning).beside() as walks:
-        found = walks.metrics(shown)
+    with others.beside(SCENE, POLICIES, 1, 'L1', 'markers', tuning) as metrics:
+        found = metrics(shown)
     assert found == expected(tuning)
     assert found['flat'].wet_accuracy > loop.run(SCENE, 'flat', 1, 'L1').metrics.wet_accuracy
     assert list(found) == list(POLICIES)
     assert sorted(shown.texts) == sorted(POLICIES)
-
-
-def test_what_has_not_begun_is_walked_here_meanwhile(monkeypatch, shown):
-    """With one other process, the last walk waits for the first ones."""
-    monkeypatch.setattr(workers, 'cores', lambda: 2)
-    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
-        found = walks.metrics(shown)
-    assert shown.texts[0] == 'oracle'
-    assert shown.places['oracle'] > 0.0
-    assert found == expected()
 
 
 def test_a_process_that_is_killed_costs_no_result(monkeypatch, shown):
@@ -77,7 +66,7 @@ def test_a_process_that_is_killed_costs_no_result(monkeypatch, shown):
             yield executor
 
     monkeypatch.setattr(workers, 'pool', watched)
-    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
+    with others.beside(SCENE, POLICIES, 1, 'L1', 'markers', None) as metrics:
         for pid in list(opened[0]._processes):
             os.kill(pid, signal.SIGKILL)
-        assert walks.metrics(shown) == expected()
+        assert metrics(shown) == expected()

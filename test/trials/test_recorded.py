@@ -2,6 +2,7 @@
 import dataclasses
 import json
 import math
+import operator
 
 import numpy as np
 import pytest
@@ -19,7 +20,6 @@ from ros_pad.bags.wire import Wire
 from ros_pad.errors import BagError
 from ros_pad.simulation import Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from studies.closed_loop import loops
 
@@ -113,18 +113,15 @@ def record(trial, records, folder):
 def test_a_recorded_trial_is_the_trial_to_the_bit(tmp_path):
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=8)
     loop = ClosedLoop(scene, 'adaptive', 0, 'L1')
-    log = TrialLog(scene, 'adaptive', 0, 'L1')
-    loops.walk(loop, scene, log)
-    trial = log.finish(loop.robot, loop.controller, loop.floor, None)
-    assert trial.dome.any() and not trial.dome.all() and trial.slipping.any()
-    read = recorded.load(record(trial, log.records, tmp_path / 'bag'))
-    for name in (
-        *('time', 'force', 'position', 'slow_time', 'pressure', 'setpoint', 'wet_probability'),
-        *('friction', 'margin', 'slip_speed', 'slipping', 'dome'),
-    ):
+    loops.walk(loop)
+    trial = loop.trial()
+    assert trial.slow['dome'].any() and not trial.slow['dome'].all()
+    assert trial.slow['slipping'].any()
+    read = recorded.load(record(trial, loop.log.records, tmp_path / 'bag'))
+    for name in ('time', 'force', 'position', 'slow_time', 'slow'):
         before, after = getattr(trial, name), getattr(read, name)
         assert before.dtype == after.dtype, name
-        np.testing.assert_array_equal(after, before, err_msg=name)
+        assert after.tobytes() == before.tobytes(), name
     np.testing.assert_array_equal(read.body[:, :2], trial.body[:, :2])
     np.testing.assert_allclose(read.body[:, 2], trial.body[:, 2], rtol=0.0, atol=1e-15)
     for name in ('scene', 'policy', 'seed', 'fidelity', 'legs', 'metrics'):
@@ -137,19 +134,22 @@ def test_a_recorded_trial_is_the_trial_to_the_bit(tmp_path):
 
 def test_other_rates_gaps_and_missing_topics_of_a_robot(tmp_path):
     start = 1_750_000_000 * 10**9  # 2025-06-15 15:06:40 UTC
-    with Recording(tmp_path / 'bag') as bag:
-        bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, 4.0), start, start)
+    messages = [
+        (0, 'leg_2/wrench', wrench(0.5, 0.0, 4.0)),
+        *((k * 10, 'leg_2/wrench', wrench(0.5, 0.0, float(k))) for k in range(1, 10)),
         # Positions of leg 2 start late and are slower; leg 5 has none.
-        for k in range(1, 10):
-            bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, float(k)), start, start + k * 10 * MS)
-        bag.add('/spider/leg_2/position', point(1.0, 2.0, 3.0), start, start + 25 * MS)
-        bag.add('/spider/leg_2/position', point(4.0, 5.0, 6.0), start, start + 60 * MS)
-        bag.add('/spider/leg_5/wrench', wrench(0.0, 0.0, 9.0), start, start + 31 * MS)
+        (25, 'leg_2/position', point(1.0, 2.0, 3.0)),
+        (60, 'leg_2/position', point(4.0, 5.0, 6.0)),
+        (31, 'leg_5/wrench', wrench(0.0, 0.0, 9.0)),
         # There is no estimator: pressures give the control times.
-        bag.add('/spider/leg_5/pressure', pressure(20000.0), start, start + 15 * MS)
-        bag.add('/spider/leg_5/pressure', pressure(30000.0), start, start + 35 * MS)
-        bag.add('/spider/leg_5/pressure_setpoint', pressure(30000.0), start, start + 15 * MS)
-        bag.add('/spider/leg_2/slip', slip(3e-3, 4e-3), start, start + 15 * MS)
+        (15, 'leg_5/pressure', pressure(20000.0)),
+        (35, 'leg_5/pressure', pressure(30000.0)),
+        (15, 'leg_5/pressure_setpoint', pressure(30000.0)),
+        (15, 'leg_2/slip', slip(3e-3, 4e-3)),
+    ]
+    with Recording(tmp_path / 'bag') as bag:
+        for ms, name, message in sorted(messages, key=operator.itemgetter(0)):
+            bag.add(f'/spider/{name}', message, start + ms * MS, start + ms * MS)
         bag.add('/spider/joint_states', Float64(), start)
         bag.add('/other/leg_count', Float64(), start)
     trial = recorded.load(tmp_path / 'bag')
@@ -162,11 +162,11 @@ def test_other_rates_gaps_and_missing_topics_of_a_robot(tmp_path):
     np.testing.assert_array_equal(trial.position[:, 0, 0], [nan] * 3 + [1.0] * 4 + [4.0] * 4)
     assert np.isnan(trial.position[:, 1]).all() and np.isnan(trial.body).all()
     np.testing.assert_allclose(trial.slow_time, [0.015, 0.035], atol=1e-12)
-    np.testing.assert_array_equal(trial.pressure, [[nan, 20000.0], [nan, 30000.0]])
-    np.testing.assert_array_equal(trial.setpoint[:, 1], [30000.0, 30000.0])
-    np.testing.assert_allclose(trial.slip_speed[:, 0], [5e-3, 5e-3], rtol=1e-12)
-    assert not trial.dome.any() and not trial.slipping.any()
-    assert np.isnan(trial.wet_probability).all()
+    np.testing.assert_array_equal(trial.slow['pressure'], [[nan, 20000.0], [nan, 30000.0]])
+    np.testing.assert_array_equal(trial.slow['setpoint'][:, 1], [30000.0, 30000.0])
+    np.testing.assert_allclose(trial.slow['slip_speed'][:, 0], [5e-3, 5e-3], rtol=1e-12)
+    assert not trial.slow['dome'].any() and not trial.slow['slipping'].any()
+    assert np.isnan(trial.slow['wetness']).all()
     assert (trial.floor, trial.metrics, trial.scene, trial.policy) == (None, None, '', '')
     assert trial.settings['recorded'] == '2025-06-15 15:06:40 UTC'
 
@@ -183,7 +183,7 @@ def test_messages_out_of_order_and_without_stamp(tmp_path):
 def test_ambient_pressure_comes_from_the_bag(tmp_path):
     with Recording(tmp_path / 'bag', ambient_pressure=95000.0) as bag:
         bag.add('/leg_1/pressure', FluidPressure(fluid_pressure=105000.0), 10 * MS, 10 * MS)
-    np.testing.assert_array_equal(recorded.load(tmp_path / 'bag').pressure, [[10000.0]])
+    np.testing.assert_array_equal(recorded.load(tmp_path / 'bag').slow['pressure'], [[10000.0]])
 
 
 @pytest.mark.parametrize('heading', [-3.0, 1.0])
@@ -212,7 +212,8 @@ def test_two_robots_in_one_bag(tmp_path):
     with pytest.raises(BagError, match='in namespace /c/ is needed'):
         recorded.load(tmp_path / 'bag', namespace='c')
     for namespace in ('b', '/b', '/b/'):
-        assert recorded.load(tmp_path / 'bag', namespace=namespace).wet_probability == [[0.2]]
+        trial = recorded.load(tmp_path / 'bag', namespace=namespace)
+        assert trial.slow['wetness'] == [[0.2]]
 
 
 def test_bags_that_are_no_trial(tmp_path):

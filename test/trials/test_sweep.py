@@ -232,12 +232,12 @@ def test_a_kill_in_the_middle_of_a_write_leaves_the_rows_before_it(tmp_path: pat
     assert (tmp_path / 'sweep' / table.RESULTS).stat().st_size > 500_000  # rows without commit
     with Results(tmp_path / 'sweep', {}, ['a', 'b']) as results:
         assert results.rows(['a', 'b'])[0]['n'] == 1
-        assert len(results) == 1
+        assert len(results.done) == 1
         results.add('b', {'n': 2})
         results.add('b', {'n': 3})
         assert [row['n'] for row in results.rows(['a', 'b'])] == [1, 2]
     base = sqlite3.connect(tmp_path / 'sweep' / table.RESULTS)
-    assert base.execute('SELECT COUNT(*) FROM trial').fetchone() == (2,)
+    assert base.execute('SELECT COUNT(*) FROM trial').fetchone() == (3,)  # one says what is swept
 
 
 # --- means --------------------------------------------------------------------------------------

@@ -83,14 +83,14 @@ def run(
         results = stack.enter_context(Results(folder, identity(sweep), jobs))
         if retry:
             results.forget_failures()
-        missing = [job for key, job in jobs.items() if key not in results]
+        missing = [job for key, job in jobs.items() if key not in results.done]
         progress = progress or (lambda done: None)
         try:
-            progress(len(results))
+            progress(len(results.done))
             with closing(_finished(missing, used)) as rows:
                 for job, row in rows:
                     results.add(job.key, row)
-                    progress(len(results))
+                    progress(len(results.done))
         finally:
             table = results.rows(jobs)
             write_tables(table, results.folder)

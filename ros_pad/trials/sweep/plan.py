@@ -6,8 +6,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
@@ -21,14 +20,11 @@ from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.tuning import attribute
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.node_settings import tuning_for
+from ros_pad.trials.node_settings import Value, errors_naming, tuning_for
 from ros_pad.yaml_text import read_yaml
 
 _ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
 _POLICY = [each.name for each in POLICY_SETTINGS]
-
-Value: TypeAlias = 'float | int | bool | str'
-"""Value of a parameter of a sweep."""
 
 Row: TypeAlias = 'dict[str, Any]'
 """Values of a trial by column."""
@@ -168,7 +164,7 @@ class Sweep:
             of_estimator = {name: value for name, value in values.items() if name in _ESTIMATOR}
             of_scene = {n: v for n, v in values.items() if n not in of_policy | of_estimator}
             scene = scene_with(source, of_scene)
-            with _errors_naming(of_estimator):
+            with errors_naming(of_estimator):
                 changes: dict[str, Any] = {_ESTIMATOR[n]: v for n, v in of_estimator.items()}
                 tuning = replace(tuning_for(scene), **changes)
             for policy in self.policies or (scene.policy,):
@@ -176,7 +172,7 @@ class Sweep:
                 parameters: dict[str, Any] = {}
                 if policy == 'adaptive':
                     parameters = {n.removeprefix(PREFIX): v for n, v in of_policy.items()}
-                    with _errors_naming(of_policy):
+                    with errors_naming(of_policy):
                         policy_named(policy, None, parameters)
                 else:
                     labels |= dict.fromkeys(of_policy)
@@ -193,18 +189,6 @@ class Sweep:
                     f' sweep are {", ".join(sorted(policies))}'
                 )
         return list(found.values())
-
-
-@contextmanager
-def _errors_naming(values: Mapping[str, Value]) -> Iterator[None]:
-    """Put parameters of the sweep before the message of an error that comes from them."""
-    try:
-        yield
-    except (ConfigError, InvalidInput) as error:
-        if not values:
-            raise
-        given = ', '.join(f'{name}={value}' for name, value in values.items())
-        raise type(error)(f'{given}: {error}') from error
 
 
 def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> Scene:
@@ -231,7 +215,7 @@ def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> S
     path = configuration.locate('scenes', source)
     Table.load(path)  # reports errors of the file itself without naming the values
     content = read_yaml(path.read_text(encoding='utf-8'))
-    with _errors_naming(values):
+    with errors_naming(values):
         for name, value in values.items():
             *folders, key = name.split('.')
             place = content

@@ -20,7 +20,6 @@ import numpy as np
 from scipy.special import stdtrit
 
 import ros_pad
-from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput, PadError
 from ros_pad.trials.sweep.plan import Row, Sweep, scene_with
 from ros_pad.trials.trial import Trial, fault_lines
@@ -28,6 +27,8 @@ from ros_pad.trials.trial import Trial, fault_lines
 RESULTS = 'trials.sqlite'
 LAST_COLUMNS = ('level', 'verdict', 'error', 'real_time_factor')
 SCENE = 'scene '  # prefix of the fingerprint of a scene in an identity
+ABOUT = 'about'  # key of the row that says what the sweep is
+AXES = 'axes'  # key of what is combined, which may grow
 
 
 def columns_of(trial: Trial) -> Row:
@@ -44,18 +45,26 @@ def columns_of(trial: Trial) -> Row:
 
 
 def identity(sweep: Sweep) -> dict[str, Any]:
-    """Return version, fidelity, parameters and checksums of the scenes of a sweep.
+    """Return version, fidelity, parameters and checksums of the scenes of a sweep, and its axes.
 
-    Trials belong to one sweep only if these are the same; scenes may be added.
+    Trials belong to one sweep only if these are the same; scenes and values may be added.
     """
+    scenes = {name: scene_with(name, {}) for name in sweep.scenes}
     return {
         'version': ros_pad.__version__,
         'fidelity': sweep.fidelity,
         'parameters': sorted(sweep.parameters),
         # The representation of a scene holds all of its values, also those of its foot.
         **{
-            f'{SCENE}{each}': hashlib.sha256(repr(scene_with(each, {})).encode()).hexdigest()
-            for each in sweep.scenes
+            f'{SCENE}{name}': hashlib.sha256(repr(scene).encode()).hexdigest()
+            for name, scene in scenes.items()
+        },
+        AXES: {
+            'scenes': list(sweep.scenes),
+            'policies': list(sweep.policies or {each.policy: 0 for each in scenes.values()}),
+            'seeds': list(sweep.seeds),
+            'parameters': {name: list(each) for name, each in sweep.parameters.items()},
+            'fidelity': sweep.fidelity,
         },
     }
 
@@ -69,6 +78,12 @@ def _named(path: pathlib.Path) -> Iterator[None]:
         if 'locked' in str(error):
             raise PadError(f'{path.parent}: a sweep is running here: wait for its end') from error
         raise PadError(f'{path} cannot be read or written: {error}') from error
+
+
+def _stored(base: sqlite3.Connection) -> tuple[Row, dict[str, Row]]:
+    """Return what a database says of its sweep, and the rows of finished trials by key."""
+    rows = {key: json.loads(row) for key, row in base.execute('SELECT key, row FROM trial')}
+    return rows.pop(ABOUT, {}), rows
 
 
 class Results:
@@ -89,6 +104,12 @@ class Results:
         When the folder holds something else, or another sweep; the message names the difference.
     PadError
         When another process has the results open, or their file is damaged.
+
+    Attributes
+    ----------
+    folder : Path
+    done : dict
+        Rows of finished trials, by key.
     """
 
     def __init__(
@@ -108,26 +129,24 @@ class Results:
             self._base = stack.enter_context(closing(base))
             base.execute('PRAGMA locking_mode = EXCLUSIVE')
             base.execute('BEGIN EXCLUSIVE')
-            base.execute('CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT)')
             base.execute('CREATE TABLE IF NOT EXISTS trial (key TEXT PRIMARY KEY, row TEXT)')
-            rows = base.execute('SELECT key, row FROM trial')
-            self._rows = {key: json.loads(row) for key, row in rows}
-            self._refuse(about, set(keys))
-            pairs = [(name, json.dumps(value)) for name, value in about.items()]
-            base.executemany('INSERT OR REPLACE INTO about VALUES (?, ?)', pairs)
+            before, self.done = _stored(base)
+            self._refuse(before, about, set(keys))
+            pair = ABOUT, json.dumps(before | dict(about))
+            base.execute('INSERT OR REPLACE INTO trial VALUES (?, ?)', pair)
             base.execute('COMMIT')
             self.close = stack.pop_all().close
 
-    def _refuse(self, about: Mapping[str, Any], keys: set[str]) -> None:
+    def _refuse(self, before: Row, about: Mapping[str, Any], keys: set[str]) -> None:
         """Refuse another sweep, and one that lacks trials which are there."""
-        for name, text in self._base.execute('SELECT name, value FROM about').fetchall():
-            before, now = json.loads(text), about.get(name)
-            if before != now and not (name.startswith(SCENE) and now is None):
+        for name, old in before.items():
+            new = about.get(name)
+            added = name == AXES or (name.startswith(SCENE) and new is None)
+            if old != new and not added:
                 raise InvalidInput(
-                    f'{self.folder} holds a sweep with {name} {before}, not {now}: take a new'
-                    ' folder'
+                    f'{self.folder} holds a sweep with {name} {old}, not {new}: take a new folder'
                 )
-        if others := sorted(set(self._rows) - keys):
+        if others := sorted(set(self.done) - keys):
             raise InvalidInput(
                 f'{self.folder} holds {len(others)} trials that are not in this sweep, such as'
                 f' {others[0]}: add their values to this sweep, or take a new folder'
@@ -139,27 +158,21 @@ class Results:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def __contains__(self, key: str) -> bool:
-        return key in self._rows
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
     def add(self, key: str, row: Row) -> None:
         """Write a row to the disk before returning; keep the row that a key has already."""
         with _named(self.folder / RESULTS):
             self._base.execute('INSERT OR IGNORE INTO trial VALUES (?, ?)', (key, json.dumps(row)))
-        self._rows.setdefault(key, row)
+        self.done.setdefault(key, row)
 
     def forget_failures(self) -> None:
         """Delete the rows of trials that failed, so that these trials run again."""
-        for key in [key for key, row in self._rows.items() if row.get('error')]:
+        for key in [key for key, row in self.done.items() if row.get('error')]:
             self._base.execute('DELETE FROM trial WHERE key = ?', (key,))
-            del self._rows[key]
+            del self.done[key]
 
     def rows(self, keys: Iterable[str]) -> list[Row]:
         """Return the finished rows, in the order of ``keys``, all with the same columns."""
-        return _aligned([self._rows[key] for key in keys if key in self._rows])
+        return _aligned([self.done[key] for key in keys if key in self.done])
 
 
 def _aligned(rows: Sequence[Row]) -> list[Row]:
@@ -200,7 +213,7 @@ class Found:
     folder : Path
         Folder of the sweep.
     sweep : Sweep
-        Scenes, policies, seeds and parameters of the finished trials.
+        Scenes, policies, seeds and parameters, also of trials that are not finished.
     rows : list of dict
         One row for each finished trial, in the order of the sweep, all with the same columns.
     about : dict
@@ -266,33 +279,17 @@ def read(folder: str | os.PathLike[str]) -> Found:
         _named(path),
         closing(sqlite3.connect(f'{path.as_uri()}?mode=ro', timeout=0.0, uri=True)) as base,
     ):
-        pairs = base.execute('SELECT name, value FROM about ORDER BY rowid').fetchall()
-        rows = [json.loads(row) for (row,) in base.execute('SELECT row FROM trial')]
+        about, done = _stored(base)
+    rows = list(done.values())
     if not rows:
         raise InvalidInput(f'{folder}: no trial of this sweep is finished')
-    about = {name: json.loads(value) for name, value in pairs}
-    names = [name for name in rows[0] if name in ('scene', 'policy', 'seed', *about['parameters'])]
-    done = {name: {row[name] for row in rows} - {None} for name in names}
-    scenes = [name.removeprefix(SCENE) for name in about if name.startswith(SCENE)]
-    parameters = {name: _sorted(done[name]) for name in names if name in about['parameters']}
-    # A row begins with its labels, in the order of the command line. A sweep runs in the order of
-    # scenes, then parameters, then policies, then seeds.
-    axes: dict[str, list[Any]] = {
-        'scene': [each for each in scenes if each in done['scene']],
-        **parameters,
-        'policy': [each for each in POLICIES if each in done['policy']],
-        'seed': sorted(done['seed']),
-    }
+    sweep = Sweep(**about[AXES])
+    axes = {'scene': sweep.scenes, **sweep.parameters}
+    axes |= {'policy': sweep.policies, 'seed': sweep.seeds}
     rows.sort(key=lambda row: [
         own.index(row[name]) if row[name] is not None else -1 for name, own in axes.items()
     ])  # fmt: skip
-    sweep = Sweep(axes['scene'], axes['policy'], axes['seed'], parameters, about['fidelity'])
     return Found(folder, sweep, _aligned(rows), about)
-
-
-def _sorted(values: Iterable[Any]) -> list[Any]:
-    """Return numbers in their order, or texts in the alphabetical one."""
-    return sorted(values, key=lambda each: (isinstance(each, str), each))
 
 
 @dataclass(frozen=True)

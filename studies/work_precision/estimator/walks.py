@@ -16,7 +16,6 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.foot import Tuning
 from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
 from studies.closed_loop import loops
@@ -106,14 +105,13 @@ def record(
     loop = ClosedLoop(scene, policy, seed, level)
     if prepare:
         prepare(loop)
-    log = TrialLog(scene, policy, seed, level)
     true = [
         [(*foot.position, *foot.force, foot.grip, foot.slip_speed, foot.wet)
          for foot in loop.robot.feet]
-        for _ in loops.samples(loop, scene, log)
+        for _ in loop.walk()
         if not loop.robot.verdict
     ]  # fmt: skip
-    truth, records = np.array(true, dtype=np.float64), log.records
+    truth, records = np.array(true, dtype=np.float64), loop.log.records
     stamps, taken = records.sample.stamps[: len(truth)], records.sample.rows[: len(truth)]
     return Recording(
         name=f'{scene.name}, {policy}, {seed}, {level}',
