@@ -131,11 +131,6 @@ class SimulatedRegulator:
         return self._ceiling
 
     @property
-    def air_used(self) -> float:
-        """Mass of air drawn from the regulator since the start, kg, up to the last step."""
-        return self._channel.air_used
-
-    @property
     def pad_pressure(self) -> float:
         """True pressure in the pad now, gauge Pa, in steps of the sensor's resolution.
 
@@ -150,7 +145,8 @@ class SimulatedRegulator:
             now = self._clock()
             self._check_answer(now)
             self._is_open = True
-            self._now = self._epoch = self._channel.time = now
+            self._now = self._epoch = now
+            self._channel.start(now)
             self._rest, self._steps = 0.0, 0
 
     def set_pressure(self, gauge_pa: float) -> None:
