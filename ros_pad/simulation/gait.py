@@ -15,6 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from ros_pad.simulation import planar_step
+
 SHORTEST_OVERLAP = 0.02
 """Least share of the cycle in which a foot takes over its load."""
 
@@ -76,16 +78,7 @@ class WalkingGait:
 
     def body_advance(self, time: float) -> float:
         """Return the intended advance of the body since time zero, m."""
-        speed = self.stride / self.cycle
-        if self.pushes:
-            angle = 4.0 * math.pi * time / self.cycle
-            return speed * (time - self.cycle / (4.0 * math.pi) * math.sin(angle))
-        if time <= 0.0:  # feet are placed as if the gait had run before
-            return speed * time
-        if time >= self.cycle:
-            return speed * (time - 0.5 * self.cycle)
-        angle = math.pi * time / self.cycle
-        return 0.5 * speed * (time - self.cycle / math.pi * math.sin(angle))
+        return planar_step.body_advance(self, time)
 
     @property
     def peak_acceleration(self) -> float:

@@ -114,7 +114,7 @@ class PlanarRobot:
         for index in range(len(self.legs)):
             phase = (gait.duty / 2.0 - gait.middles[index]) % 1.0
             if phase < gait.duty:
-                offset = gait.reach + planar_step.body_advance(model, -phase * gait.cycle)
+                offset = gait.reach + planar_step.body_advance(gait, -phase * gait.cycle)
             else:
                 offset = -gait.reach * math.cos(math.pi * (phase - gait.duty) / (1.0 - gait.duty))
             table[planar_step.PHASE][index] = phase

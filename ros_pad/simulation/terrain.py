@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
@@ -52,8 +52,7 @@ def _field(smoothing: float, seed: int, stream: int) -> np.ndarray:
     noise = np.random.default_rng([seed, stream]).normal(size=shape)
     from scipy.ndimage import gaussian_filter  # here, because many floors have no patches
 
-    field: np.ndarray = gaussian_filter(noise, smoothing / CELL, mode='wrap')
-    return field
+    return np.asarray(gaussian_filter(noise, smoothing / CELL, mode='wrap'))
 
 
 @dataclass(frozen=True)
@@ -85,14 +84,10 @@ class Floor:
     origin: tuple[float, float]
     film_thickness: float
     heights: np.ndarray | None = None
-    _rows: list[bytes] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         number('cell', self.cell, 'm', above=True)
         number('film_thickness', self.film_thickness, 'm')
-        # Lists would be searched whole by every full run of the garbage collector.
-        rows = [row.tobytes() for row in np.asarray(self.wet_map, dtype=bool)]
-        object.__setattr__(self, '_rows', rows)
 
     @classmethod
     def uniform(cls, wet: bool, film_thickness: float) -> Floor:
@@ -223,18 +218,7 @@ class Floor:
         return replace(self, heights=heights * (unevenness / heights.std()))
 
     def height(self, x: float, y: float) -> float:
-        """Return the height of the ground at a position.
-
-        Parameters
-        ----------
-        x, y : float
-            World position, m.
-
-        Returns
-        -------
-        float
-            Height, m.
-        """
+        """Return the height of the ground at a world position, m."""
         heights = self.heights
         if heights is None:
             return 0.0
@@ -243,50 +227,17 @@ class Floor:
         return float(heights[row, column])
 
     def wet(self, x: float, y: float) -> bool:
-        """Return whether there is liquid at a position.
-
-        Parameters
-        ----------
-        x, y : float
-            World position, m.
-
-        Returns
-        -------
-        bool
-            True on wet ground.
-        """
-        rows = self._rows
-        row = rows[int((y - self.origin[1]) // self.cell) % len(rows)]
-        return row[int((x - self.origin[0]) // self.cell) % len(row)] != 0
+        """Return whether there is liquid at a world position, m."""
+        rows, columns = self.wet_map.shape
+        row = int((y - self.origin[1]) // self.cell) % rows
+        return bool(self.wet_map[row, int((x - self.origin[0]) // self.cell) % columns])
 
     def depth(self, x: float, y: float) -> float:
-        """Return the depth of the liquid at a position.
-
-        Parameters
-        ----------
-        x, y : float
-            World position, m.
-
-        Returns
-        -------
-        float
-            Depth, m; 0 on dry ground.
-        """
+        """Return the depth of the liquid at a world position, m; 0 on dry ground."""
         return self.film_thickness if self.wet(x, y) else 0.0
 
     def wet_along(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return :meth:`wet` for arrays of positions.
-
-        Parameters
-        ----------
-        x, y : array
-            World position, m.
-
-        Returns
-        -------
-        array of bool
-            True on wet ground, in the shape of the positions.
-        """
+        """Return :meth:`wet` for arrays of positions, m, in their shape."""
         rows, columns = self.wet_map.shape
         # floor_divide is as exact as //; a rounded quotient could put a position just before the
         # edge of a cell in the next cell.

@@ -48,7 +48,6 @@ def test_gait(time, cycle, duty, stride):
     )
     feet, body = table(), [0.0] * planar_step.BODY
     planar_step.move_feet(own, body, feet, time, time)
-    assert planar_step.body_advance(own, time) == gait.body_advance(time)
     for index, leg in enumerate(LEGS):
         phase = gait.phase(leg - 1, time)
         assert feet[planar_step.PHASE][index] == phase
