@@ -293,7 +293,7 @@ def test_a_device_that_loses_its_setpoint_receives_it_again(emulated, opened, un
     regulator = opened('alicat', port=line.path)
     regulator.set_pressure(60e3)
     until(lambda: regulator.read().setpoint == 60e3)
-    device.valves['A'].setpoint = 20e3  # changed by hand
+    device.valves['A'].follow(20e3)  # changed by hand
     until(lambda: line.commands.count('ALS 60.00 10') == 2)
     until(lambda: regulator.read().setpoint == 60e3)
     assert device.valves['A'].setpoint == pytest.approx(60e3)

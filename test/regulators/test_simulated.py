@@ -247,7 +247,7 @@ def test_unknown_backend_lists_the_backends():
 
 
 def test_unknown_option_names_the_nearest_and_lists_all():
-    with pytest.raises(ConfigError, match=r"'hose_lenght' \(= 2.0\).*'hose_length'.*ceiling"):
+    with pytest.raises(ConfigError, match=r"'hose_lenght' \(= 2.0\).*ceiling.*'hose_length'"):
         create('simulated', hose_lenght=2.0)
 
 
