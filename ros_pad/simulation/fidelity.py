@@ -19,12 +19,11 @@ from ros_pad.configuration import choice, shared_folder
 from ros_pad.contact import LARGE_PAD
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.margin import features, reserve
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.scene import RAIL_LEG, LeggedBody, Scene
+from ros_pad.simulation.scene import RAIL_LEG, Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.yaml_text import read_yaml
 
@@ -138,11 +137,10 @@ def value_of(scene: Scene, name: str) -> Any:
 
 def _usual(scene: Scene) -> bool:
     """Return whether the gait has the phases and pushes that walked in the study."""
-    gait = scene.gait
-    if not isinstance(gait, WalkingGait):
+    if scene.robot == RAIL_LEG:
         return True
-    assert isinstance(scene.body, LeggedBody)
-    usual = scene.body.robot.gait
+    body, gait = scene.legged
+    usual = body.robot.gait
     if usual is None or not gait.pushes:
         return False
     shifts = [a - b for a, b in zip(gait.middles, usual.phases, strict=True)]

@@ -25,7 +25,7 @@ from ros_pad.robots.rotation import Array
 from ros_pad.signals import children_spared
 from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings, mjcf, tow_step
 from ros_pad.simulation.robot import FootState, Proprioception, Vector, check_reach
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.servos import Servos
 from ros_pad.simulation.soles import Sled, Soles
 from ros_pad.simulation.terrain import Floor
@@ -101,9 +101,9 @@ class FullRobot:
         settings: SolverSettings = RECOMMENDED,
     ) -> None:
         mujoco = _import_mujoco()
-        assert isinstance(scene.body, LeggedBody)
+        body, _ = scene.legged
+        robot = body.robot
         number('period', period, 's', above=True)
-        robot, low = scene.body.robot, scene.body.ground
         if robot.servo is None:
             raise ConfigError(
                 f'{scene.source}: fidelity L2 needs servos: the file of {scene.robot} has no'
@@ -129,7 +129,7 @@ class FullRobot:
         self.soles = Soles(scene, floor, period, dt, self.model, self.data)
         self._sled = Sled(scene.tow, floor, self.model, self.data) if scene.tow.weight else None
         self._senses = _Senses(mujoco, self.model, self.data, scene, period)
-        self._place(-low)
+        self._place(-body.ground)
 
     @property
     def feet(self) -> list[FootState]:
@@ -238,8 +238,7 @@ class _Senses:
     """
 
     def __init__(self, mujoco: Any, model: Any, data: Any, scene: Scene, period: float) -> None:
-        assert isinstance(scene.body, LeggedBody)
-        robot, first = scene.body.robot, model.geom('foot_1').id
+        robot, first = scene.legged[0].robot, model.geom('foot_1').id
         self._to_matrix = mujoco.mju_quat2Mat
         self._imu = robot.imu
         self._data = data

@@ -109,20 +109,6 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Floats) -> bool:
     return True
 
 
-def walk(model: PlanarModel, body: Any, feet: Any, pressures: Floats, count: int) -> bool:
-    """Make ``count`` steps with the same gauge pressures, Pa, or fewer if the walk ends.
-
-    The walk ends at a step that does not converge, and then the result is False. It also ends
-    after the step in which the robot tips over.
-    """
-    for _ in range(count):
-        if not step(model, body, feet, pressures):
-            return False
-        if body[TIPPED] > 0.0:
-            break
-    return True
-
-
 # --- gait -------------------------------------------------------------------------------------
 
 
@@ -572,8 +558,8 @@ def report(model: PlanarModel, body: Any, feet: Any, contacts: list[Pushed]) -> 
         feet[MARKER_Y][index] = body[Y] + sine * home_x + cosine * home_y
 
 
-# Functions that `walk` calls; the compiler needs a list of them.
+# Functions that `step` calls; the compiler needs a list of them.
 PARTS = (
-    step, move_feet, body_advance, load_share, touch_down, is_wet, share_loads, balance, grip,
+    move_feet, body_advance, load_share, touch_down, is_wet, share_loads, balance, grip,
     dome_load, drain, resistance, on_film, newton, derivatives, push, report,
 )  # fmt: skip

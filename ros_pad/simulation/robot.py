@@ -13,8 +13,7 @@ import numpy as np
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
-from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 
 STEERED = 0.1
 """Error of the heading that legs must be able to steer back from, rad."""
@@ -162,9 +161,8 @@ def check_reach(scene: Scene) -> FeetSolver:
         When a foot does not reach the places to which lift, stride and steering of the gait bring
         it, or a joint would be beyond the travel of its servo or its limits.
     """
-    assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
-    robot, gain = scene.body.robot, scene.heading_gain
-    lift, stride = scene.gait.lift, scene.gait.stride
+    body, gait = scene.legged
+    lift, stride, gain = gait.lift, gait.stride, scene.heading_gain
     motions: tuple[tuple[str, float, str, Callable[[float], str]], ...] = (
         ('gait.lift', lift, 'm', lambda value: _miss(scene, value, 0.0, 0.0)),
         ('gait.stride', stride, 'm', lambda value: _miss(scene, lift, value, 0.0)),
@@ -178,15 +176,14 @@ def check_reach(scene: Scene) -> FeetSolver:
                 low, high = (low, middle) if miss(middle) else (middle, high)
             raise ConfigError(
                 f'{scene.source}: {name} = {value:g} {unit} is not allowed: at most {low:.3g}'
-                f' {unit} is within reach of the legs of {robot.source} from its home: {why}'
+                f' {unit} is within reach of the legs of {body.robot.source} from its home: {why}'
             )
-    return FeetSolver(robot)
+    return FeetSolver(body.robot)
 
 
 def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:
     """Return why the feet cannot follow the gait with these values, or an empty text."""
-    body, gait = scene.body, scene.gait
-    assert isinstance(body, LeggedBody) and isinstance(gait, WalkingGait)
+    body, gait = scene.legged
     robot, solver = body.robot, FeetSolver(body.robot)
     home, travel = robot.home.ravel(), robot.servo.travel if robot.servo else math.inf
     limits = np.array([joint.limits for leg in robot.chains.legs for joint in leg])

@@ -372,6 +372,20 @@ class Scene:
     faults: tuple[Fault, ...] = ()
 
     @property
+    def legged(self) -> tuple[LeggedBody, WalkingGait]:
+        """Body and gait of a robot with legs; raise InvalidInput for the leg on its rail."""
+        if isinstance(self.body, LeggedBody) and isinstance(self.gait, WalkingGait):
+            return self.body, self.gait
+        raise InvalidInput(f'scene {self.name!r} is not allowed: a robot with legs is needed')
+
+    @property
+    def on_rail(self) -> tuple[RailBody, RailGait]:
+        """Body and gait of the leg on its rail; raise InvalidInput for other robots."""
+        if isinstance(self.body, RailBody) and isinstance(self.gait, RailGait):
+            return self.body, self.gait
+        raise InvalidInput(f'scene {self.name!r} is not allowed: a rail leg is needed')
+
+    @property
     def duration(self) -> float:
         """Simulated time of a trial, s."""
         return self.settle + self.cycles * self.gait.cycle
@@ -388,8 +402,7 @@ class Scene:
         """Normal force of a foot when the fewest feet stand, N; that of the spring on a rail."""
         if isinstance(self.gait, WalkingGait):
             return self.body.mass * GRAVITY / self.gait.fewest
-        assert isinstance(self.body, RailBody)
-        return self.body.load
+        return self.on_rail[0].load
 
     @property
     def regulator_options(self) -> dict[str, Any]:
