@@ -19,10 +19,6 @@ from ros_pad.control.morphology import COMMAND_TIMEOUT
 from ros_pad.errors import InvalidInput, LimitError, PadError, ProtocolError
 from ros_pad.regulators.protocol import Regulator, permitted
 
-SLEW_LIMIT = Setting(
-    'slew_limit', 0.0, 'Largest rate of change of the set-point in force, except for vents; 0: no'
-    ' limit.', 'Pa/s', 0.0, 1e7,
-)  # fmt: skip
 CEILING_TOLERANCE = Setting(
     'ceiling_tolerance', 0.02, 'Share of the ceiling by which the pressure of a pad may exceed the'
     ' ceiling; above that, the pad is vented and held.', '', 0.005, 0.2,
@@ -42,9 +38,6 @@ class SupervisorSettings:
     command_timeout : float
         s, 0.02 to 60. A pad without a command for longer is vented. This is also the largest
         accepted age of a command.
-    slew_limit : float
-        Largest rate of change of the set-point in force, except for vents, Pa/s, 0 to 1e7; 0 means
-        no limit.
     ceiling_tolerance : float
         Share of the ceiling by which the pressure of a pad may exceed the ceiling before the pad
         is held, 0.005 to 0.2.
@@ -58,12 +51,11 @@ class SupervisorSettings:
     """
 
     command_timeout: float = COMMAND_TIMEOUT.default
-    slew_limit: float = SLEW_LIMIT.default
     ceiling_tolerance: float = CEILING_TOLERANCE.default
     on_fault: str = ON_FAULT.default
 
     def __post_init__(self) -> None:
-        for each in (COMMAND_TIMEOUT, SLEW_LIMIT, CEILING_TOLERANCE, ON_FAULT):
+        for each in (COMMAND_TIMEOUT, CEILING_TOLERANCE, ON_FAULT):
             each.accept(getattr(self, each.name))
 
 
@@ -131,68 +123,41 @@ class Answers:
 
 
 class Outlet:
-    """Set-point of the regulator of one pad, and its way to the last command.
+    """Set-point of the regulator of one pad.
 
     Attributes
     ----------
     regulator : Regulator
         The regulator.
-    target : float
-        Last accepted command, gauge Pa; 0 after a vent.
     sent : float or None
         Last set-point that the regulator accepted, gauge Pa; None before the first vent, and after
         an error of the device.
     vented : bool
         Whether the last set-point is zero and the regulator accepted it; True at first.
-    moved_ns : int
-        Time of the last set-point under the slew limit, ns.
     """
 
     def __init__(self, regulator: Regulator) -> None:
         self.regulator = regulator
-        self.target = 0.0
         self.sent: float | None = None
         self.vented = True
-        self.moved_ns = 0
 
     def vent(self) -> bool:
         """Vent, and return whether the pad was not vented before; raise errors of the device."""
-        self.target = 0.0
         before, self.vented, self.sent = self.vented, False, None
         self.regulator.vent()
         self.vented, self.sent = True, 0.0
         return not before
 
-    def approach(self, target: float, last: float, limit: float, elapsed_ns: int) -> None:
-        """Send the set-point nearest to a target that the slew limit allows by now.
-
-        Parameters
-        ----------
-        target : float
-            Pressure, gauge Pa.
-        last : float
-            Where to begin if it is not known which set-point is in force, gauge Pa.
-        limit : float
-            Slew limit, Pa/s; 0: none.
-        elapsed_ns : int
-            Present time, ns.
-        """
-        setpoint = target
-        if limit:
-            step = limit * max(0, elapsed_ns - self.moved_ns) * 1e-9
-            start = last if self.sent is None else self.sent
-            setpoint = min(max(target, start - step), start + step)
-        # Set even if sending fails, so that this time does not enlarge the next step.
-        self.moved_ns = elapsed_ns
+    def set(self, setpoint: float) -> None:
+        """Send a set-point, gauge Pa; raise errors of the device."""
         try:
             self.regulator.set_pressure(setpoint)
         except (InvalidInput, LimitError):
-            raise  # the old set-point and target stay in force
+            raise  # the old set-point stays in force
         except PadError:
             self.vented, self.sent = False, None  # the device may have received it nevertheless
             raise
-        self.target, self.sent = target, setpoint
-        self.vented = setpoint == target == 0.0
+        self.sent, self.vented = setpoint, setpoint == 0.0
 
 
 class SupervisedChannel:
@@ -204,8 +169,7 @@ class SupervisedChannel:
     tick. A pad whose
     pressure passes the ceiling by more than ``ceiling_tolerance`` is vented and held: its commands
     are refused until :meth:`activate`. With ``on_fault`` = ``vent``, a pad that the device or the
-    monitor reports as faulty is also vented and held. The monitor needs ten readings a second, and
-    pauses while a slew limit delays the set-point.
+    monitor reports as faulty is also vented and held. The monitor needs ten readings a second.
 
     Parameters
     ----------
@@ -295,7 +259,6 @@ class SupervisedChannel:
         self.monitor = PadMonitor(self.outlet.regulator.ceiling)
         # The monitor reports a silent device only after a first reading.
         self.monitor.update(elapsed_ns * 1e-9, None, self.pressure)
-        self.outlet.moved_ns = elapsed_ns
         self.active = True
 
     def deactivate(self, reason: str) -> None:
@@ -332,7 +295,7 @@ class SupervisedChannel:
         if not self.active:
             return False
         try:
-            self._approach(self._permitted(gauge_pa, age), elapsed_ns)
+            self.outlet.set(self._permitted(gauge_pa, age))
         except PadError as error:
             self.refuse(error)
             return False
@@ -360,7 +323,7 @@ class SupervisedChannel:
             self.vent(self.held or f'no set-point for {timeout:g} s')
 
     def read(self, elapsed_ns: int) -> float | None:
-        """Read the device, check device and pad, and continue towards the last command.
+        """Read the device, and check device and pad.
 
         Parameters
         ----------
@@ -374,8 +337,6 @@ class SupervisedChannel:
         """
         monitor, outlet, time = self.monitor, self.outlet, elapsed_ns * 1e-9
         known = monitor.silence, monitor.fault
-        # While the slew limit moves the set-point, the pad lags behind: the monitor gets None.
-        aim = outlet.sent if outlet.sent == outlet.target else None
         pressure = None
         try:
             reading = outlet.regulator.read()
@@ -386,13 +347,13 @@ class SupervisedChannel:
                 )
         except PadError as error:
             self._device_faults = (str(error),)
-            monitor.update(time, aim, None)
+            monitor.update(time, outlet.sent, None)
             self._log.error(f'leg {self.leg}: {error}', throttle_duration_sec=1.0)
         else:
             self._device_faults = reading.faults
             self.pressure = pressure = reading.pressure
             self.setpoint = reading.setpoint
-            monitor.update(time, aim, pressure)
+            monitor.update(time, outlet.sent, pressure)
             ceiling = outlet.regulator.ceiling
             if pressure > ceiling * (1.0 + self.settings.ceiling_tolerance):
                 fault = Kind.CEILING(pressure, ceiling)
@@ -404,7 +365,6 @@ class SupervisedChannel:
             lasting = monitor.reason if pressure is None else self.fault
             if lasting:
                 self.hold(lasting, self.present)
-        self._continue(elapsed_ns)
         return pressure
 
     def row(self, elapsed_ns: int) -> tuple[Any, ...]:
@@ -456,7 +416,7 @@ class SupervisedChannel:
         return {
             'pressure (Pa gauge)': f'{self.pressure:.0f}',
             'set-point (Pa gauge)': f'{self.setpoint:.0f}',
-            'command (Pa gauge)': f'{self.outlet.target:.0f}',
+            'command (Pa gauge)': f'{self.outlet.sent or 0.0:.0f}',
             'set-points accepted': str(self.answers.accepted),
             'set-points refused': str(self.answers.refused),
             'time to fill (s)': f'{self.monitor.fill_time:.2f}',
@@ -476,17 +436,3 @@ class SupervisedChannel:
         if self.held:
             raise LimitError(f'set-point {gauge:g} Pa is not allowed: {self.held}')
         return gauge
-
-    def _approach(self, target: float, elapsed_ns: int) -> None:
-        self.outlet.approach(target, self.setpoint, self.settings.slew_limit, elapsed_ns)
-
-    def _continue(self, elapsed_ns: int) -> None:
-        """Continue towards a target that the slew limit did not allow at once."""
-        outlet = self.outlet
-        if outlet.sent == outlet.target:
-            outlet.moved_ns = elapsed_ns
-        elif outlet.sent is not None:
-            try:
-                self._approach(outlet.target, elapsed_ns)
-            except PadError as error:
-                self._log.error(f'leg {self.leg}: {error}', throttle_duration_sec=1.0)

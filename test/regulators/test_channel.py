@@ -484,28 +484,6 @@ def test_a_pad_that_is_held_says_so_in_records():
     assert math.isnan(row['pad'])  # not known of a real device
 
 
-# --- slew ----------------------------------------------------------------------------------------
-
-
-def test_set_points_approach_the_command_within_the_slew_limit():
-    rig, channel, device = device_rig(slew_limit=50e3)
-    rig.tick(1.0)  # a pause does not add to the next step
-    sent = []
-    for gauge, seconds in ((60e3, 1.5), (15e3, 1.2)):
-        for _ in range(round(seconds / 0.02)):
-            rig.hold([gauge], 0.02)
-            sent.append(device.setpoint)
-    steps = [b - a for a, b in zip([0.0, *sent], sent, strict=False)]
-    # Steps are 1 kPa each 20 ms: 60 up, 15 at rest, 45 down.
-    assert steps[:60] == pytest.approx([1e3] * 60)
-    assert steps[60:75] == pytest.approx([0.0] * 15)
-    assert steps[75:120] == pytest.approx([-1e3] * 45)
-    assert (max(sent), sent[-1]) == (60e3, 15e3)
-    assert channel.health().level == Level.OK
-    channel.vent('a test')
-    assert device.setpoint == 0.0  # a vent has no slew limit
-
-
 # --- any sequence of calls -----------------------------------------------------------------------
 
 LEGS = (1, 2)
@@ -528,7 +506,6 @@ ACTIONS = st.one_of(
     st.tuples(st.just('deactivate'), legs),
     st.tuples(st.just('activate'), legs),
     st.tuples(st.just('set'), st.just('command_timeout'), numbers),
-    st.tuples(st.just('set'), st.just('slew_limit'), numbers),
     st.tuples(st.just('set'), st.just('on_fault'), st.sampled_from(['report', 'vent', 'x'])),
     st.tuples(st.just('cable'), legs, st.one_of(st.none(), errors)),
     st.tuples(st.just('gauge'), legs, st.one_of(st.none(), numbers)),
@@ -614,7 +591,6 @@ def test_no_sequence_of_calls_passes_the_ceiling_or_stops_the_timeout(actions):
         trial.gauge(leg, None)
     trial.tick(round(trial.settings.command_timeout * 1e9) + 1)
     assert all(device.setpoint == 0.0 for device in trial.devices.values())
-    trial.set('slew_limit', 0.0)
     for leg, channel in trial.channels.items():
         channel.activate(trial.now_ns)
         assert channel.command(30e3, 0.0, trial.now_ns)
