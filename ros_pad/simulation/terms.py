@@ -134,10 +134,9 @@ def _lines(scene: Scene) -> Term:
 
 def _by_friction(term: Term, scene: Scene, policy: str) -> float | None:
     """Return the effect of a term that changes the friction; None if unknown."""
-    promises = levels.Promises.load()
-    if term.bound is None or scene.floor.kind == 'dry' or promises.beyond(scene, policy):
+    if term.bound is None or scene.floor.kind == 'dry':
         return None
-    effect = promises.bound(levels.FRICTION, scene, policy)
+    effect = levels.Promises.load().bound(levels.FRICTION, scene, policy)
     return term.bound * (effect / _STEP) if effect < math.inf else None
 
 
@@ -238,7 +237,7 @@ def _air(scene: Scene) -> Term:
 
 
 def _joints(scene: Scene, policy: str) -> Term:
-    bound = levels.choose(scene, 'L1', policy).bound
+    bound = levels.Promises.load().bound('L1', scene, policy)
     known = bound if bound < math.inf else None
     reason = (
         f'of the {scene.metric}: L1 against the top level, on which feet slip by millimetres where'
