@@ -213,21 +213,15 @@ def test_text_and_back():
 
 BAD = [
     ('{kind: fire}', "kind = 'fire' is not allowed: one of stuck_valve, supply_loss, leak"),
-    ('{start: 1.0}', "key 'kind' is missing"),
     ('{kind: leak}', "key 'conductance' is missing"),
     ('{kind: leak, conductance: 1.0}', 'a number from 1e-14 to 1e-06 m³/(s Pa) is needed'),
     ('{kind: silence, start: -1}', 'start = -1.0 is not allowed: a number from 0 to 1000000000 s'),
     ('{kind: silence, start: 2, end: 2}', 'end = 2.0 is not allowed: a number above 2'),
-    ('{kind: silence, start: .nan}', 'start = nan is not allowed'),
     ('{kind: silence, legs: [9]}', 'legs = [9] is not allowed: a list of different whole'),
-    ('{kind: silence, legs: 2}', 'legs = 2 is not allowed'),
     ('{kind: silence, offset: 1.0}', "unknown key 'offset'"),
     ('{kind: sensor_drift, offset: 2e5}', 'a number from -100000 to 100000 Pa is needed'),
-    ('{kind: sensor_drift, offset: 1, rise: -1}', 'rise = -1.0 is not allowed'),
     ('{kind: supply_loss, pressure: -1}', 'pressure = -1.0 is not allowed: a number from 0 to'),
     ('silence', "expected a table of keys, found 'silence'"),
-    ('{kind: leak', 'not valid YAML'),
-    ('{kind: silence, kind: leak}', "key 'kind' occurs twice"),
 ]
 
 
@@ -242,9 +236,7 @@ def test_bad_texts(text, message):
     'arguments, message',
     [
         ({'kind': 'silence', 'start': math.inf}, 'start'),
-        ({'kind': 'silence', 'start': 2.0, 'end': 1.0}, 'end = 1.0 '),
         ({'kind': 'silence', 'offset': 5.0}, 'a fault of kind silence has none'),
-        ({'kind': 'leak'}, 'conductance = 0'),
         ({'kind': 'leak', 'conductance': math.nan}, 'conductance'),
     ],
 )
@@ -277,7 +269,6 @@ def test_scene_lists_faults(tmp_path):
     'name, faults, message',
     [
         ('hexapod_patches', {'kind': 'leak'}, 'a list is needed'),
-        ('hexapod_patches', ['leak'], 'fault 1: expected a table'),
         (
             'hexapod_patches',
             [{'kind': 'silence'}, {'kind': 'leek'}],

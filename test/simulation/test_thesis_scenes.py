@@ -52,13 +52,6 @@ def test_dome_on_wet_ground_is_quite_similar_to_flat_on_dry_ground(goal_times):
     assert 1.0 <= goal_times['leg_wet_dome_75'] / goal_times['leg_dry_flat'] < 1.15
 
 
-def test_dry_leg_advances_by_its_stroke():
-    cycles = 70
-    trial = run('leg_dry_flat')
-    assert trial.metrics.distance_m == pytest.approx(cycles * 0.05, rel=2e-3)
-    assert trial.metrics.slip_path_m[0] < 1e-3
-
-
 def test_slipping_leg_advances_as_its_forces_say():
     """By hand: a foot with 0.12 * 2.5 N of friction pushes 0.85 kg against a drag of 0.235 N.
 
@@ -104,13 +97,9 @@ def bend(trial):
     return np.abs(trial.body[:, 1]).max() / trial.body[-1, 0]
 
 
-@pytest.mark.slow
-def test_walks_are_valid(walks):
-    assert [trial.metrics.verdict for name in NAMES for trial in walks[name]] == [None] * 9
-
-
 def test_middle_legs_slip_on_wet_ground_and_domes_help(walks):
     """Thesis 5.3, figures 41 and 42: legs 2 and 5 slip with flat pads, much less with domes."""
+    assert [trial.metrics.verdict for name in NAMES for trial in walks[name]] == [None] * 9
     assert middle_slip(walks, 'wet_flat') > 3.0 * middle_slip(walks, 'dry_flat')
     assert middle_slip(walks, 'wet_flat') > 2.0 * middle_slip(walks, 'wet_dome')
 
