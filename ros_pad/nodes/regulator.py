@@ -241,7 +241,7 @@ class RegulatorNode(PadNode, LifecycleNode):
         else:
             self.supervision.vent('~/vent was called')
         channels = self.supervision.channels
-        failed = [str(each.leg) for each in channels if not each.outlet.vented]
+        failed = [str(each.leg) for each in channels if not each.vented]
         response.success = bool(channels) and not failed
         response.message = 'the pads stay vented until the node is activated again'
         if not channels:

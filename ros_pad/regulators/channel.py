@@ -122,44 +122,6 @@ class Answers:
         return Health(Level.WARN, refusal) if refusal else health
 
 
-class Outlet:
-    """Set-point of the regulator of one pad.
-
-    Attributes
-    ----------
-    regulator : Regulator
-        The regulator.
-    sent : float or None
-        Last set-point that the regulator accepted, gauge Pa; None before the first vent, and after
-        an error of the device.
-    vented : bool
-        Whether the last set-point is zero and the regulator accepted it; True at first.
-    """
-
-    def __init__(self, regulator: Regulator) -> None:
-        self.regulator = regulator
-        self.sent: float | None = None
-        self.vented = True
-
-    def vent(self) -> bool:
-        """Vent, and return whether the pad was not vented before; raise errors of the device."""
-        before, self.vented, self.sent = self.vented, False, None
-        self.regulator.vent()
-        self.vented, self.sent = True, 0.0
-        return not before
-
-    def set(self, setpoint: float) -> None:
-        """Send a set-point, gauge Pa; raise errors of the device."""
-        try:
-            self.regulator.set_pressure(setpoint)
-        except (InvalidInput, LimitError):
-            raise  # the old set-point stays in force
-        except PadError:
-            self.vented, self.sent = False, None  # the device may have received it nevertheless
-            raise
-        self.sent, self.vented = setpoint, setpoint == 0.0
-
-
 class SupervisedChannel:
     """Supervise the regulator of one pad.
 
@@ -186,8 +148,11 @@ class SupervisedChannel:
     ----------
     pressure, setpoint : float
         Last values from the device, gauge Pa.
-    outlet : Outlet
-        Set-point of the regulator.
+    regulator : Regulator
+        As given.
+    sent : float or None
+        Last set-point that the regulator accepted, gauge Pa; None before the first vent, and after
+        an error of the device.
     answers : Answers
         Numbers of accepted and refused commands, and the last refusal.
     monitor : PadMonitor
@@ -209,7 +174,8 @@ class SupervisedChannel:
     ) -> None:
         self.leg = leg
         self.settings = settings
-        self.outlet = Outlet(regulator)
+        self.regulator = regulator
+        self.sent: float | None = None
         self.answers = Answers()
         self.monitor = PadMonitor(regulator.ceiling)
         self.pressure = self.setpoint = 0.0
@@ -233,9 +199,14 @@ class SupervisedChannel:
         return monitor.silence or device or monitor.fault or self._hold
 
     @property
+    def vented(self) -> bool:
+        """Whether the last set-point is zero and the regulator accepted it."""
+        return self.sent == 0.0
+
+    @property
     def sags(self) -> bool:
         """Whether the pad is faulty with a pressure below its set-point."""
-        monitor, sent = self.monitor, self.outlet.sent
+        monitor, sent = self.monitor, self.sent
         return bool(monitor.fault and sent and monitor.pressure < sent - monitor.tolerance)
 
     def open(self) -> None:
@@ -246,9 +217,10 @@ class SupervisedChannel:
         PadError
             When the device cannot be opened or vented; it is closed then.
         """
-        self.outlet.regulator.open()
+        self.regulator.open()
         try:
-            self.outlet.vent()
+            self.regulator.vent()
+            self.sent = 0.0
         except BaseException:
             self.close('its first vent failed')
             raise
@@ -256,7 +228,7 @@ class SupervisedChannel:
     def activate(self, elapsed_ns: int) -> None:
         """Accept commands from now on, at a time, ns, also of a pad that was held."""
         self.held, self._hold = '', Kind.NONE()
-        self.monitor = PadMonitor(self.outlet.regulator.ceiling)
+        self.monitor = PadMonitor(self.regulator.ceiling)
         # The monitor reports a silent device only after a first reading.
         self.monitor.update(elapsed_ns * 1e-9, None, self.pressure)
         self.active = True
@@ -270,7 +242,7 @@ class SupervisedChannel:
         """Vent the pad and close the device; errors are logged, not raised."""
         self.deactivate(f'closing the device: {reason}')
         try:
-            self.outlet.regulator.close()
+            self.regulator.close()
         except Exception as error:
             self._log.error(f'leg {self.leg}: cannot close the device: {error}')
 
@@ -295,7 +267,7 @@ class SupervisedChannel:
         if not self.active:
             return False
         try:
-            self.outlet.set(self._permitted(gauge_pa, age))
+            self._set(self._permitted(gauge_pa, age))
         except PadError as error:
             self.refuse(error)
             return False
@@ -335,11 +307,11 @@ class SupervisedChannel:
         float or None
             Measured pressure, gauge Pa; None when the device gave no valid reading.
         """
-        monitor, outlet, time = self.monitor, self.outlet, elapsed_ns * 1e-9
+        monitor, time = self.monitor, elapsed_ns * 1e-9
         known = monitor.silence, monitor.fault
         pressure = None
         try:
-            reading = outlet.regulator.read()
+            reading = self.regulator.read()
             if not math.isfinite(reading.pressure):
                 raise ProtocolError(
                     f'the device reports a pressure of {reading.pressure!r} Pa: a finite number is'
@@ -347,14 +319,14 @@ class SupervisedChannel:
                 )
         except PadError as error:
             self._device_faults = (str(error),)
-            monitor.update(time, outlet.sent, None)
+            monitor.update(time, self.sent, None)
             self._log.error(f'leg {self.leg}: {error}', throttle_duration_sec=1.0)
         else:
             self._device_faults = reading.faults
             self.pressure = pressure = reading.pressure
             self.setpoint = reading.setpoint
-            monitor.update(time, outlet.sent, pressure)
-            ceiling = outlet.regulator.ceiling
+            monitor.update(time, self.sent, pressure)
+            ceiling = self.regulator.ceiling
             if pressure > ceiling * (1.0 + self.settings.ceiling_tolerance):
                 fault = Kind.CEILING(pressure, ceiling)
                 self.hold(str(fault), fault)
@@ -372,7 +344,7 @@ class SupervisedChannel:
         pressure = self.read(elapsed_ns)
         fault = self.present
         try:
-            pad = getattr(self.outlet.regulator, 'pad_pressure', math.nan)
+            pad = getattr(self.regulator, 'pad_pressure', math.nan)
         except PadError:  # the device is closed
             pad = math.nan
         known = (math.nan, math.nan) if pressure is None else (pressure, self.setpoint)
@@ -381,11 +353,13 @@ class SupervisedChannel:
     def vent(self, reason: str) -> None:
         """Vent the pad; a failure is logged, and the next tick tries again."""
         self.commanded_ns = None
+        news, self.sent = not self.vented, None
         try:
-            news = self.outlet.vent()
+            self.regulator.vent()
         except Exception as error:  # no error of one device may stop the vents of the others
             self._log.error(f'leg {self.leg}: cannot vent: {error}', throttle_duration_sec=1.0)
             return
+        self.sent = 0.0
         if news:
             self._log.info(f'leg {self.leg}: vented: {reason}')
 
@@ -399,7 +373,7 @@ class SupervisedChannel:
 
     def health(self) -> Health:
         """Return level and message of device and pad, without refusals."""
-        timed_out, vented = self.commanded_ns is None, self.outlet.vented
+        timed_out, vented = self.commanded_ns is None, self.vented
         faults = joined(
             self.held,
             self.fault not in self.held and self.fault,
@@ -416,7 +390,7 @@ class SupervisedChannel:
         return {
             'pressure (Pa gauge)': f'{self.pressure:.0f}',
             'set-point (Pa gauge)': f'{self.setpoint:.0f}',
-            'command (Pa gauge)': f'{self.outlet.sent or 0.0:.0f}',
+            'command (Pa gauge)': f'{self.sent or 0.0:.0f}',
             'set-points accepted': str(self.answers.accepted),
             'set-points refused': str(self.answers.refused),
             'time to fill (s)': f'{self.monitor.fill_time:.2f}',
@@ -432,7 +406,18 @@ class SupervisedChannel:
                 f'stamp of the set-point is {stamped}: at most {limit:g} s is accepted;'
                 ' synchronise the clocks'
             )
-        gauge = permitted(gauge_pa, self.outlet.regulator.ceiling)
+        gauge = permitted(gauge_pa, self.regulator.ceiling)
         if self.held:
             raise LimitError(f'set-point {gauge:g} Pa is not allowed: {self.held}')
         return gauge
+
+    def _set(self, setpoint: float) -> None:
+        """Send a set-point, gauge Pa; raise errors of the device."""
+        try:
+            self.regulator.set_pressure(setpoint)
+        except (InvalidInput, LimitError):
+            raise  # the old set-point stays in force
+        except PadError:
+            self.sent = None  # the device may have received it nevertheless
+            raise
+        self.sent = setpoint

@@ -185,13 +185,10 @@ class Hose:
             number('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
 
     @cached_property
-    def _law(self) -> tuple[float, float, float]:
-        """What every step needs, last the laminar flow over the difference of p², kg/(s Pa²)."""
-        slope, rt = math.inf, REFERENCE_PRESSURE / REFERENCE_DENSITY
-        if self.length:
-            drag = 256.0 * AIR_VISCOSITY * self.length * rt
-            slope = math.pi * self.inner_diameter**4 / drag
-        return self.sonic_conductance, self.critical_ratio, slope
+    def _laminar(self) -> float:
+        """Laminar flow over the difference of p², kg/(s Pa²)."""
+        drag = 256.0 * AIR_VISCOSITY * self.length * (REFERENCE_PRESSURE / REFERENCE_DENSITY)
+        return math.pi * self.inner_diameter**4 / drag if drag else math.inf
 
     @property
     def volume(self) -> float:
@@ -203,7 +200,7 @@ class Hose:
         """Part of the bore behind the resistance, m³."""
         return self.volume if self.measured_conductance is not None else 0.5 * self.volume
 
-    @property
+    @cached_property
     def sonic_conductance(self) -> float:
         """Sonic conductance C, m³/(s Pa)."""
         if self.measured_conductance is not None:
@@ -211,7 +208,7 @@ class Hose:
         d = self.inner_diameter
         return 0.029 * d * d / math.sqrt(self.length / d**1.25 + 510.0)
 
-    @property
+    @cached_property
     def critical_ratio(self) -> float:
         """b, the ratio of absolute pressures, downstream over upstream, where choking begins."""
         return 474.0 * self.sonic_conductance / self.inner_diameter**2
@@ -229,9 +226,8 @@ class Hose:
         float
             Conductance, kg/(s Pa), finite and positive also where the pressures are equal.
         """
-        sonic, ratio, slope = self._law
-        turbulent = conductance(sonic, ratio, first, second)
-        laminar = slope * (first + second)
+        turbulent = conductance(self.sonic_conductance, self.critical_ratio, first, second)
+        laminar = self._laminar * (first + second)
         return laminar if laminar < turbulent else turbulent
 
 

@@ -177,7 +177,7 @@ class Rig:
 
     def device(self, leg):
         channels = {each.leg: each for each in self.node.supervision.channels}
-        return channels[leg].outlet.regulator if channels else None
+        return channels[leg].regulator if channels else None
 
     def tick(self, step_ns):
         """Advance the clock; where records come, it matters 0.1 s after the last one."""

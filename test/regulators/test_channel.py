@@ -252,11 +252,11 @@ def test_a_command_concerns_the_legs_that_it_names():
     rig.command(50e3, 60e3, 70e3)
     rig.command(math.nan, CEILING + 1.0, 20e3)
     _, second, third = rig.channels
-    assert [each.outlet.sent for each in rig.channels] == [50e3, 60e3, 20e3]
+    assert [each.sent for each in rig.channels] == [50e3, 60e3, 20e3]
     assert [each.answers.accepted for each in rig.channels] == [1, 1, 2]
     assert [each.answers.refused for each in rig.channels] == [0, 1, 0]
     rig.command(math.nan, 10e3, 10e3, age_ns=501 * MS)
-    assert [each.outlet.sent for each in rig.channels] == [50e3, 60e3, 20e3]
+    assert [each.sent for each in rig.channels] == [50e3, 60e3, 20e3]
     assert '0.501 s old' in second.answers.refusal and '0.501 s old' in third.answers.refusal
 
 
@@ -267,12 +267,12 @@ def test_commands_of_other_legs_do_not_keep_a_pad_up():
     for _ in range(6):
         rig.now_ns += 100 * MS
         rig.command(math.nan, 50e3)
-    assert [each.outlet.sent for each in rig.channels] == [0.0, 50e3]
+    assert [each.sent for each in rig.channels] == [0.0, 50e3]
 
 
 def test_a_device_that_fails_keeps_no_other_pad_up():
     rig = Rig(Device(), Device()).start()
-    one, other = (each.outlet.regulator for each in rig.channels)
+    one, other = (each.regulator for each in rig.channels)
     rig.command(50e3, 50e3)
     one.broken = TransportError('cable')
     rig.tick(0.52)
@@ -309,12 +309,12 @@ def test_a_vent_that_fails_is_repeated_until_the_device_obeys(error):
     rig.send(50e3)
     device.broken = error
     channel.vent('a test')
-    assert not channel.outlet.vented
+    assert not channel.vented
     assert device.setpoint == 50e3
     assert channel.health().message.endswith('cannot be vented')
     device.broken = None
     rig.tick()
-    assert (device.setpoint, channel.outlet.vented) == (0.0, True)
+    assert (device.setpoint, channel.vented) == (0.0, True)
 
 
 def test_a_command_without_an_answer_is_vented():
@@ -537,7 +537,7 @@ class Trial:
             old = abs(self.now_ns - self.accepted_ns[leg]) > timeout_ns
             if not self.devices[leg].broken and (step_ns < 0 or old):
                 assert self.devices[leg].setpoint == 0.0
-                assert channel.outlet.vented
+                assert channel.vented
 
     def read(self, leg):
         channel, device = self.channels[leg], self.devices[leg]
@@ -549,7 +549,7 @@ class Trial:
 
     def vent(self, leg):
         self.channels[leg].vent('a test')
-        assert self.channels[leg].outlet.vented == (not self.devices[leg].broken)
+        assert self.channels[leg].vented == (not self.devices[leg].broken)
 
     def deactivate(self, leg):
         self.channels[leg].deactivate('a test')
