@@ -20,9 +20,6 @@ from ros_pad.regulators.alicat import SOURCE_SINCE, STATUS, UNITS_SINCE
 from ros_pad.regulators.serial_device import unit
 from ros_pad.regulators.serial_text import FULL_COUNT
 
-LINE_FAULTS = ('silence', 'half_line', 'garbage', 'unplugged')
-"""Faults of any line; each device has further ones."""
-
 UNIT_CODE = '10'
 """Code by which the emulated Alicat names its units."""
 
@@ -128,7 +125,10 @@ class EmulatedDevice(ABC):
         See :class:`FaultSchedule`.
     """
 
-    FAULTS: tuple[str, ...] = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
+    FAULTS: tuple[str, ...] = (
+        *('silence', 'half_line', 'garbage', 'unplugged'),  # of the line
+        *('rejection', 'analog_source', 'echo'),
+    )
     terminator = '\n'
 
     def __init__(

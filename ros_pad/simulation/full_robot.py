@@ -33,8 +33,6 @@ from ros_pad.simulation.terrain import Floor
 TIPPED = 0.5
 """Angle between trunk and normal of the floor, rad, at which the walk ends with a verdict."""
 
-_UPRIGHT = math.cos(TIPPED)
-
 _FAR = 1e6  # m: if the body is farther away than this, the solution has diverged
 
 
@@ -219,7 +217,7 @@ class FullRobot:
         """Set the verdict when the body tips over or a joint is far from its set-point."""
         state = self._state.tolist()
         upright = 1.0 - 2.0 * (state[4] * state[4] + state[5] * state[5])
-        if upright < _UPRIGHT:
+        if upright < math.cos(TIPPED):
             self._end(f'tip-over: the body leans {math.acos(max(-1.0, upright)):.2f} rad')
         elif lost := self._servos.lost(state[7:]):
             self._end(lost)

@@ -23,7 +23,6 @@ ROLL_SHARE = 0.6  # inertia of the trunk about x, or about y, over that about z,
 # Radius of the ball that stands for the sole: too small to roll noticeably as the tibia tilts.
 POINT = 1e-4  # m
 
-_OWN_BODIES = ('world', 'trunk', 'sled')
 _SHORTEST = 1e-4  # s: a towed load that needs shorter steps is refused
 
 
@@ -207,7 +206,7 @@ def _leg_xml(leg: int, robot: Robot, scale: float) -> str:
     for place, joint in enumerate(joints):
         end = joints[place + 1].at[:3, 3] if place + 1 < len(joints) else foot
         kind = 'type="slide" ' if joint.slides else ''
-        link = joint.name + '_link' * (joint.name in _OWN_BODIES)
+        link = joint.name + '_link' * (joint.name in ('world', 'trunk', 'sled'))
         text += (
             f'<body name="{escape(link)}" {at_frame(joint.at)}>'
             f'<joint {kind}name="{escape(joint.name)}"'

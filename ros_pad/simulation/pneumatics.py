@@ -38,7 +38,6 @@ then below 1 % of that step at every time."""
 
 _SETTLED = 0.1  # Pa from the target at which a pad has settled: 1/100 of the sensor's resolution
 _INSTANT = 1e-9  # s: shorter times are rounding errors of the caller's clock
-_CELLS = 100  # number of cells of the table of the pad's volume, from zero to full scale
 
 
 @dataclass(frozen=True)
@@ -250,7 +249,7 @@ def pad_stiffness(
     tuple
         Width of a cell of pressure, Pa, and the stiffness in cells from 0 to beyond full scale.
     """
-    count = _CELLS if callable(pad_volume) else 1
+    count = 100 if callable(pad_volume) else 1
     cell = full_scale / count
     contents = []  # pressure times volume, Pa m³
     for place in range(count + 1):

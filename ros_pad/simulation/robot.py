@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -162,26 +162,24 @@ def check_reach(scene: Scene) -> FeetSolver:
         it, or a joint would be beyond the travel of its servo or its limits.
     """
     body, gait = scene.legged
-    lift, stride, gain = gait.lift, gait.stride, scene.heading_gain
-    motions: tuple[tuple[str, float, str, Callable[[float], str]], ...] = (
-        ('gait.lift', lift, 'm', lambda value: _miss(scene, value, 0.0, 0.0)),
-        ('gait.stride', stride, 'm', lambda value: _miss(scene, lift, value, 0.0)),
-        ('gait.heading_gain', gain, '1/s', lambda value: _miss(scene, lift, stride, value)),
-    )
-    for name, value, unit, miss in motions:
-        if why := miss(value):
+    wanted = {'lift': gait.lift, 'stride': gait.stride, 'heading_gain': scene.heading_gain}
+    tried = dict.fromkeys(wanted, 0.0)
+    for name, value in wanted.items():
+        tried[name] = value
+        if why := _miss(scene, **tried):
             low, high = 0.0, value
             while high - low > 0.01 * value:
-                middle = 0.5 * (low + high)
-                low, high = (low, middle) if miss(middle) else (middle, high)
+                tried[name] = middle = 0.5 * (low + high)
+                low, high = (low, middle) if _miss(scene, **tried) else (middle, high)
+            unit = '1/s' if name == 'heading_gain' else 'm'
             raise ConfigError(
-                f'{scene.source}: {name} = {value:g} {unit} is not allowed: at most {low:.3g}'
+                f'{scene.source}: gait.{name} = {value:g} {unit} is not allowed: at most {low:.3g}'
                 f' {unit} is within reach of the legs of {body.robot.source} from its home: {why}'
             )
     return FeetSolver(body.robot)
 
 
-def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:
+def _miss(scene: Scene, lift: float, stride: float, heading_gain: float) -> str:
     """Return why the feet cannot follow the gait with these values, or an empty text."""
     body, gait = scene.legged
     robot, solver = body.robot, FeetSolver(body.robot)
@@ -190,7 +188,7 @@ def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:
     lows = np.maximum(limits[:, 0], home - travel)
     highs = np.minimum(limits[:, 1], home + travel)
     reach = gait.reach() * stride / gait.stride
-    turn = STEERED * gain * gait.duty * gait.cycle  # of a whole stance, rad
+    turn = STEERED * heading_gain * gait.duty * gait.cycle  # of a whole stance, rad
     for step in range(8, -9, -1):
         ahead, turned = reach * step / 8.0, turn * (8 - step) / 16.0
         up = lift * (1.0 - (step / 8.0) ** 2)

@@ -26,8 +26,6 @@ from ros_pad.simulation.terrain import FLOORS, Floor, patch_lengths
 LEAST_TRUNK = 0.01
 """Least share of a robot's mass that is not legs."""
 
-METRICS = ('distance', 'slip')
-
 RAIL_LEG = 'rail_leg'
 """The robot of a scene with the leg on its rail."""
 
@@ -511,7 +509,7 @@ class Scene:
             settle=table.number('settle', 's', 0.0, 60.0, default=1.0),
             cycles=table.integer('cycles', 1, 100000),
             accuracy=table.number('accuracy', '(relative)', 1e-4, 1.0),
-            metric=table.choice('metric', METRICS, default='distance'),
+            metric=table.choice('metric', ('distance', 'slip'), default='distance'),
             wanted=table.choice('wanted', ('walk', 'metric'), default='walk'),
             faults=listed(table),
         )
