@@ -260,15 +260,12 @@ class _Senses:
         # The damping of the joints is the back-EMF of their motors.
         efforts = data.qfrc_actuator[moving] + data.qfrc_passive[moving]
         return Proprioception(
-            tuple((data.qvel[3:6] @ to_imu).tolist()),
-            tuple((pull @ turn @ to_imu).tolist()),
-            data.qpos[moving.start + 1 : moving.stop + 1].tolist(),
-            data.qvel[moving].tolist(),
-            efforts.tolist(),
-            [
-                tuple((turn.T @ force).tolist())
-                for turn, force in zip(self._turns, forces, strict=True)
-            ],
+            data.qvel[3:6] @ to_imu,
+            pull @ turn @ to_imu,
+            data.qpos[moving.start + 1 : moving.stop + 1].copy(),
+            data.qvel[moving].copy(),
+            efforts,
+            np.array([turn.T @ force for turn, force in zip(self._turns, forces, strict=True)]),
         )
 
     def _motion(self, places: Array, speeds: Array) -> tuple[Array, Array]:

@@ -26,21 +26,21 @@ class Proprioception(NamedTuple):
 
     Attributes
     ----------
-    gyro, accelerometer : tuple of float
+    gyro, accelerometer : array (3,)
         Angular velocity, rad/s, and specific force, m/s² (+9.81 upwards at rest), IMU axes.
-    positions, velocities, efforts : list of float
+    positions, velocities, efforts : array (joints,)
         Of the joints, in the order of ``joint_names``: rad, rad/s, and the torques of the motors
         behind their gears, N m.
-    forces : list of tuple of float
+    forces : array (feet, 3)
         Force of the ground on each foot, N, in the axes of the link that carries the foot.
     """
 
-    gyro: Vector
-    accelerometer: Vector
-    positions: list[float]
-    velocities: list[float]
-    efforts: list[float]
-    forces: list[Vector]
+    gyro: Array
+    accelerometer: Array
+    positions: Array
+    velocities: Array
+    efforts: Array
+    forces: Array
 
 
 @dataclass(slots=True)

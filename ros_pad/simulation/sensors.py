@@ -153,9 +153,9 @@ class BodySensors:
 
     def read(self, truth: Proprioception, time: float) -> BodyReading:
         """Return the next reading of the true values at a time, s."""
-        values = np.array((*truth.gyro, *truth.accelerometer)) + self._biases
+        values = np.concatenate(truth[:2]) + self._biases
         values += self._imu_scale * self._imu.standard_normal(6)
-        joints = np.array((truth.positions, truth.velocities, truth.efforts))
+        joints = np.array(truth[2:5])
         joints += self._joint_scale * self._joints.standard_normal(joints.shape)
         rows = SAMPLE.rows(len(truth.forces))
         rows['force'] = truth.forces
