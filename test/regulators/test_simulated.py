@@ -119,6 +119,19 @@ def test_a_clock_that_goes_back():
     assert regulator.read() == before
 
 
+def test_a_dead_time_goes_on_when_it_is_opened_at_another_time():
+    regulator, clock = opened(dead_time=0.1)
+    regulator.set_pressure(75e3)
+    clock.now = 0.05
+    regulator.close()
+    clock.now = 500.0
+    regulator.open()
+    clock.now = 500.04
+    assert regulator.pad_pressure == 0.0
+    clock.now = 501.0
+    assert regulator.pad_pressure == 75e3
+
+
 def test_a_day_without_a_reading_takes_few_steps(monkeypatch):
     steps = 0
     step = PneumaticChannel.step

@@ -162,6 +162,35 @@ def test_loads_by_trying_every_set_of_feet():
     assert min(seen.values()) > 20
 
 
+# --- friction -----------------------------------------------------------------------------------
+
+
+def test_a_step_obeys_newtons_law():
+    """Forces and moments of all contacts, stuck or slipping, are the change of momentum."""
+    rng = np.random.default_rng(3)
+    mass, inertia, dt, slipped = 2.0, 0.03, 0.004, 0
+    for _ in range(100):
+        contacts = [
+            (*rng.uniform(-0.15, 0.15, 2), *rng.normal(0.0, 0.3, 2), rng.normal(0.0, 2.0), radius,
+             rng.uniform(0.1, 5.0), 5e3 * dt)
+            for radius in (0.011, 0.011, 0.011, 0.0)
+        ]  # fmt: skip
+        free = tuple(rng.normal(0.0, 0.3, 3))
+        vx, vy, w, converged = planar_step.newton(free, mass, inertia, contacts, dt, free)
+        assert converged
+        pushes = [planar_step.push(vx, vy, w, each, dt) for each in contacts]
+        force = np.array([each[:2] for each in pushes])
+        moment = sum(
+            each[0] * push[1] - each[1] * push[0] + push[2]
+            for each, push in zip(contacts, pushes, strict=True)
+        )
+        change = mass * np.array([vx - free[0], vy - free[1]]), inertia * (w - free[2])
+        assert force.sum(0) * dt == pytest.approx(change[0], abs=1e-9)
+        assert moment * dt == pytest.approx(change[1], abs=1e-9)
+        slipped += sum(each[3] > 0.0 for each in pushes)
+    assert 50 < slipped < 400
+
+
 # --- compiled -----------------------------------------------------------------------------------
 
 

@@ -102,6 +102,16 @@ def test_dead_time_need_not_be_a_number_of_steps():
     assert channel.outlet == pytest.approx(50e3 * unit[1], abs=0.2)
 
 
+def test_set_points_in_dead_time_are_followed_one_after_another():
+    model = RegulatorModel(dead_time=0.1, dead_band=0.0)
+    channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
+    channel.step(50e3, 0.05)
+    channel.step(0.0, 0.09)
+    assert channel.outlet > 10e3
+    channel.step(0.0, 2.0)
+    assert channel.outlet == 0.0
+
+
 def test_quantum_rounds_the_setpoint():
     channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
     assert channel.step(50_049.0, 2.0) == 50_000.0

@@ -57,6 +57,11 @@ def test_noise_is_white_and_as_wide_as_asked_for():
     assert np.abs((flat[1000:] * flat[:-1000]).mean(axis=0)).max() < 0.08
 
 
+def test_noise_repeats_with_its_seed():
+    assert (read(seed=1, count=3) == read(seed=1, count=3)).all()
+    assert (read(seed=1, count=3) != read(seed=2, count=3)).all()
+
+
 def test_without_noise_the_truth():
     samples = read(SensorNoise(250.0, 0.0, 0.0), count=3)
     assert (samples[:, 0, 0] == [1.0, -2.0, 7.0]).all()
