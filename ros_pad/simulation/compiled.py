@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -53,8 +54,9 @@ def dispatcher() -> tuple[Any, Callable[[Any], Any]]:
         import numba
     except ImportError as error:
         raise ConfigError('compiled steps need numba: pip install "ros_pad[fast]"') from error
-    for function in planar_step.PARTS:
-        numba.extending.register_jitable(error_model='numpy')(function)
+    for part in vars(planar_step).values():
+        if inspect.isfunction(part) and part is not planar_step.step:
+            numba.extending.register_jitable(error_model='numpy')(part)
     try:
         made = numba.njit(cache=True, error_model='numpy')(planar_step.step)
     except RuntimeError:  # numba finds no folder that is writable

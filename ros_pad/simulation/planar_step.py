@@ -556,10 +556,3 @@ def report(model: PlanarModel, body: Any, feet: Any, contacts: list[Pushed]) -> 
         home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
         feet[MARKER_X][index] = body[X] + cosine * home_x - sine * home_y
         feet[MARKER_Y][index] = body[Y] + sine * home_x + cosine * home_y
-
-
-# Functions that `step` calls; the compiler needs a list of them.
-PARTS = (
-    move_feet, body_advance, load_share, touch_down, is_wet, share_loads, balance, grip,
-    dome_load, drain, resistance, on_film, newton, derivatives, push, report,
-)  # fmt: skip

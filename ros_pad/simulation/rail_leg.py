@@ -12,11 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from ros_pad.configuration import instance, number
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
-from ros_pad.simulation.robot import FootState, Vector, check_pressures, contacts_of
+from ros_pad.simulation.robot import FootState, Vector, check_pressures
 from ros_pad.simulation.scene import RailBody, Scene
 from ros_pad.simulation.terrain import Floor
 
@@ -96,7 +98,7 @@ class RailLeg:
     @property
     def contacts(self) -> Array:
         """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
-        return contacts_of(self.feet)
+        return np.array([(*foot.force, foot.moment, *foot.position) for foot in self.feet])
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period``.

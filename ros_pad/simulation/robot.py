@@ -81,11 +81,6 @@ class FootState:
     overload_time: float = 0.0
 
 
-def contacts_of(feet: Sequence[FootState]) -> Array:
-    """Return :attr:`SimulatedRobot.contacts` of states of feet."""
-    return np.array([(*foot.force, foot.moment, *foot.position) for foot in feet])
-
-
 class SimulatedRobot(Protocol):
     """A simulated robot: step it with the pads' gauge pressures, then read its feet and body.
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import sub
 
 import numpy as np
 
@@ -84,9 +83,8 @@ class Servos:
 
     def lost(self, joints: Sequence[float]) -> str:
         """Return which of the joints, rad, is far from its set-point, or an empty text."""
-        worst = max(map(abs, map(sub, self.targets, joints)))
-        if worst <= LOST:
+        off = np.abs(np.subtract(self.targets, joints))
+        worst = int(off.argmax())
+        if off[worst] <= LOST:
             return ''
-        lost = [abs(a - b) == worst for a, b in zip(self.targets, joints, strict=True)]
-        name = self._robot.joint_names[lost.index(True)]
-        return f'servo {name} is {worst:.2f} rad off its set-point'
+        return f'servo {self._robot.joint_names[worst]} is {off[worst]:.2f} rad off its set-point'

@@ -180,7 +180,7 @@ def test_bad_pressures(pressures):
 
 def test_a_scene_of_another_robot_is_refused():
     hexapod = Scene.load('hexapod_patches')
-    with pytest.raises(InvalidInput, match='hexapod_patches.* a rail leg is needed'):
+    with pytest.raises(InvalidInput, match=r'hexapod_patches.* a rail leg is needed'):
         leg_of(hexapod)
-    with pytest.raises(InvalidInput, match='leg_dry_flat.* a robot with legs is needed'):
+    with pytest.raises(InvalidInput, match=r'leg_dry_flat.* a robot with legs is needed'):
         PlanarRobot(SHIPPED, SHIPPED.floor.build(0), 0.004)

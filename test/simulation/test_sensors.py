@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.robot import FootState, Proprioception, contacts_of
+from ros_pad.simulation.robot import FootState, Proprioception
 from ros_pad.simulation.scene import Scene, SensorNoise
 from ros_pad.simulation.sensors import BodySensors, Sensors
 
@@ -24,7 +24,7 @@ class Statue:
 
     @property
     def contacts(self):
-        return contacts_of(self.feet)
+        return np.array([(*foot.force, foot.moment, *foot.position) for foot in self.feet])
 
 
 def both(rows):
