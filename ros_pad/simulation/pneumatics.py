@@ -350,7 +350,13 @@ class PneumaticChannel:
         self._transition = (0.0, regulator.transition(0.0))
 
     def start(self, time: float) -> None:
-        """Go on at another time on the schedule of the faults, s."""
+        """Go on at another time, in the same state.
+
+        Parameters
+        ----------
+        time : float
+            Time on the schedule of the faults, s.
+        """
         shift, self.time = time - self.time, time
         self._pending = tuple((due + shift, target) for due, target in self._pending)
         self.settled = self.settled and not self._faults

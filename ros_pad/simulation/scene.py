@@ -371,14 +371,26 @@ class Scene:
 
     @property
     def legged(self) -> tuple[LeggedBody, WalkingGait]:
-        """Body and gait of a robot with legs; raise InvalidInput for the leg on its rail."""
+        """Body and gait of a robot with legs.
+
+        Raises
+        ------
+        InvalidInput
+            For the leg on its rail.
+        """
         if isinstance(self.body, LeggedBody) and isinstance(self.gait, WalkingGait):
             return self.body, self.gait
         raise InvalidInput(f'scene {self.name!r} is not allowed: a robot with legs is needed')
 
     @property
     def on_rail(self) -> tuple[RailBody, RailGait]:
-        """Body and gait of the leg on its rail; raise InvalidInput for other robots."""
+        """Body and gait of the leg on its rail.
+
+        Raises
+        ------
+        InvalidInput
+            For other robots.
+        """
         if isinstance(self.body, RailBody) and isinstance(self.gait, RailGait):
             return self.body, self.gait
         raise InvalidInput(f'scene {self.name!r} is not allowed: a rail leg is needed')

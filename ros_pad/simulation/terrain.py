@@ -218,7 +218,18 @@ class Floor:
         return replace(self, heights=heights * (unevenness / heights.std()))
 
     def height(self, x: float, y: float) -> float:
-        """Return the height of the ground at a world position, m."""
+        """Return the height of the ground at a position.
+
+        Parameters
+        ----------
+        x, y : float
+            World position, m.
+
+        Returns
+        -------
+        float
+            Height, m.
+        """
         heights = self.heights
         if heights is None:
             return 0.0
@@ -227,17 +238,50 @@ class Floor:
         return float(heights[row, column])
 
     def wet(self, x: float, y: float) -> bool:
-        """Return whether there is liquid at a world position, m."""
+        """Return whether there is liquid at a position.
+
+        Parameters
+        ----------
+        x, y : float
+            World position, m.
+
+        Returns
+        -------
+        bool
+            True on wet ground.
+        """
         rows, columns = self.wet_map.shape
         row = int((y - self.origin[1]) // self.cell) % rows
         return bool(self.wet_map[row, int((x - self.origin[0]) // self.cell) % columns])
 
     def depth(self, x: float, y: float) -> float:
-        """Return the depth of the liquid at a world position, m; 0 on dry ground."""
+        """Return the depth of the liquid at a position.
+
+        Parameters
+        ----------
+        x, y : float
+            World position, m.
+
+        Returns
+        -------
+        float
+            Depth, m; 0 on dry ground.
+        """
         return self.film_thickness if self.wet(x, y) else 0.0
 
     def wet_along(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return :meth:`wet` for arrays of positions, m, in their shape."""
+        """Return :meth:`wet` for arrays of positions.
+
+        Parameters
+        ----------
+        x, y : array
+            World position, m.
+
+        Returns
+        -------
+        array of bool
+            True on wet ground, in the shape of the positions.
+        """
         rows, columns = self.wet_map.shape
         # floor_divide is as exact as //; a rounded quotient could put a position just before the
         # edge of a cell in the next cell.
