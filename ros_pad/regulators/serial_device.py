@@ -34,9 +34,6 @@ device is tried again, s."""
 LONGEST_REPLY = 256
 """Longest reply, bytes; a longer one without a terminator is an error."""
 
-QUIET = 0.02
-"""Pause after a failure, s, so that a late reply is not read as the next one."""
-
 UNITS = {
     'Pa': 1.0,
     'hPa': 100.0,
@@ -194,7 +191,7 @@ class Bus:
                     kind = TransportError
                     what = f'{"half a line" if answer else "no reply"} within'
                     what += f' {line.reply_timeout:g} s'
-            time.sleep(QUIET)
+            time.sleep(0.02)  # so that a late reply is not read as the next one
             self._port.read(self._port.in_waiting)
         except Exception as error:  # pyserial raises many types when a device disappears
             raise PortLost(

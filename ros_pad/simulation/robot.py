@@ -15,9 +15,6 @@ from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
 from ros_pad.simulation.scene import Scene
 
-STEERED = 0.1
-"""Error of the heading that legs must be able to steer back from, rad."""
-
 Vector = tuple[float, float, float]
 
 
@@ -183,7 +180,8 @@ def _miss(scene: Scene, lift: float, stride: float, heading_gain: float) -> str:
     lows = np.maximum(limits[:, 0], home - travel)
     highs = np.minimum(limits[:, 1], home + travel)
     reach = gait.reach() * stride / gait.stride
-    turn = STEERED * heading_gain * gait.duty * gait.cycle  # of a whole stance, rad
+    # Legs must be able to steer back from a heading of 0.1 rad; this is the turn of a stance, rad.
+    turn = 0.1 * heading_gain * gait.duty * gait.cycle
     for step in range(8, -9, -1):
         ahead, turned = reach * step / 8.0, turn * (8 - step) / 16.0
         up = lift * (1.0 - (step / 8.0) ** 2)
