@@ -28,7 +28,6 @@ from ros_pad.regulators import BACKENDS, create
 from ros_pad.regulators.channel import (
     CEILING_TOLERANCE,
     ON_FAULT,
-    SLEW_LIMIT,
     Health,
     SupervisedChannel,
     SupervisorSettings,
@@ -53,7 +52,6 @@ PARAMETERS = (
         'Pa', 1000.0, 1e6,
     ),
     Parameter(**vars(COMMAND_TIMEOUT), live=True),
-    Parameter(**vars(SLEW_LIMIT), live=True),
     Parameter(**vars(CEILING_TOLERANCE)),
     Parameter(**vars(ON_FAULT), live=True),
     Parameter(
@@ -243,7 +241,7 @@ class RegulatorNode(PadNode, LifecycleNode):
         else:
             self.supervision.vent('~/vent was called')
         channels = self.supervision.channels
-        failed = [str(each.leg) for each in channels if not each.outlet.vented]
+        failed = [str(each.leg) for each in channels if not each.vented]
         response.success = bool(channels) and not failed
         response.message = 'the pads stay vented until the node is activated again'
         if not channels:

@@ -107,7 +107,7 @@ class SimulatorNode(PadNode):
             raise ConfigError(f'node {self.get_name()}: {error}') from error
         period = self.period_ns * 1e-9
         self.robot = fidelity.build(with_terms(self.scene), self.floor, period, level)
-        self._sensors = Sensors.of(self.scene, seed)
+        self._sensors = Sensors(self.scene, seed)
         self._body_sensors: BodySensors | None = None
         if joints:
             self._body_sensors = BodySensors(self.scene, seed, len(self.robot.joint_names))

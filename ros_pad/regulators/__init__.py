@@ -3,24 +3,23 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
+from ros_pad.configuration import nearest
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.regulators.alicat import AlicatRegulator
 from ros_pad.regulators.protocol import Reading, Regulator
-from ros_pad.regulators.serial_text import SerialTextRegulator
+from ros_pad.regulators.serial_text import SerialTextRegulator, smc_itv
 from ros_pad.regulators.simulated import SimulatedRegulator
-from ros_pad.regulators.smc_itv import SmcItvRegulator
 
 __all__ = ['BACKENDS', 'Reading', 'Regulator', 'SimulatedRegulator', 'create']
 
 BACKENDS: dict[str, Callable[..., Regulator]] = {
     'simulated': SimulatedRegulator,
     'alicat': AlicatRegulator,
-    'smc_itv': SmcItvRegulator,
+    'smc_itv': smc_itv,
     'serial_text': SerialTextRegulator,
 }
 """Classes or functions that make a regulator, by backend; their arguments are the options."""
@@ -55,15 +54,15 @@ def create(backend: str, **options: Any) -> Regulator:
     """
     if backend not in BACKENDS:
         raise ConfigError(
-            f'there is no regulator backend {backend!r}{_nearest(backend, BACKENDS)}: the backends'
-            f' are {", ".join(BACKENDS)}'
+            f'there is no regulator backend {backend!r}: the backends are {", ".join(BACKENDS)}'
+            f'{nearest(backend, [*BACKENDS])}'
         )
     allowed = inspect.signature(BACKENDS[backend]).parameters
     for name in options:
         if name not in allowed:
             raise ConfigError(
-                f'regulator backend {backend!r} has no option {name!r} (= {options[name]!r})'
-                f'{_nearest(name, allowed)}: its options are {", ".join(allowed)}'
+                f'regulator backend {backend!r} has no option {name!r} (= {options[name]!r}): its'
+                f' options are {", ".join(allowed)}{nearest(name, [*allowed])}'
             )
     missing = [name for name, p in allowed.items() if p.default is p.empty and name not in options]
     if missing:
@@ -72,8 +71,3 @@ def create(backend: str, **options: Any) -> Regulator:
         return BACKENDS[backend](**options)
     except InvalidInput as error:
         raise ConfigError(f'regulator backend {backend!r}: {error}') from error
-
-
-def _nearest(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(str(name), list(known), n=1)
-    return f' (did you mean {near[0]!r}?)' if near else ''

@@ -26,9 +26,6 @@ STATUS = {
 }
 """Status letters after a frame, with their meaning in the maker's manuals."""
 
-HARMLESS = ('LCK',)
-"""Status letters that are no fault: a locked front panel may be intended."""
-
 UNITS_SINCE = (9, 0)  # first firmware whose LS has a unit in command and answer
 SOURCE_SINCE = (10, 5)  # first firmware with LSS
 _NUMBER = re.compile(r'[+-]?\d+(?:\.(\d*))?')
@@ -183,7 +180,8 @@ class AlicatRegulator(SerialRegulator):
         self._decimals = len(numbers[1][1] or '')
         self._held = 'HLD' in status
         resolution = math.pow(10.0, -self._decimals) * self._unit
-        faults = tuple(STATUS[each] for each in status if each not in HARMLESS)
+        # A locked front panel may be intended.
+        faults = tuple(STATUS[each] for each in status if each != 'LCK')
         return Frame(pressure, setpoint, resolution, faults)
 
     def _setpoint_in(self, command: str, reply: str) -> tuple[float, str]:

@@ -19,10 +19,6 @@ from ros_pad.control.morphology import COMMAND_TIMEOUT
 from ros_pad.errors import InvalidInput, LimitError, PadError, ProtocolError
 from ros_pad.regulators.protocol import Regulator, permitted
 
-SLEW_LIMIT = Setting(
-    'slew_limit', 0.0, 'Largest rate of change of the set-point in force, except for vents; 0: no'
-    ' limit.', 'Pa/s', 0.0, 1e7,
-)  # fmt: skip
 CEILING_TOLERANCE = Setting(
     'ceiling_tolerance', 0.02, 'Share of the ceiling by which the pressure of a pad may exceed the'
     ' ceiling; above that, the pad is vented and held.', '', 0.005, 0.2,
@@ -42,9 +38,6 @@ class SupervisorSettings:
     command_timeout : float
         s, 0.02 to 60. A pad without a command for longer is vented. This is also the largest
         accepted age of a command.
-    slew_limit : float
-        Largest rate of change of the set-point in force, except for vents, Pa/s, 0 to 1e7; 0 means
-        no limit.
     ceiling_tolerance : float
         Share of the ceiling by which the pressure of a pad may exceed the ceiling before the pad
         is held, 0.005 to 0.2.
@@ -58,12 +51,11 @@ class SupervisorSettings:
     """
 
     command_timeout: float = COMMAND_TIMEOUT.default
-    slew_limit: float = SLEW_LIMIT.default
     ceiling_tolerance: float = CEILING_TOLERANCE.default
     on_fault: str = ON_FAULT.default
 
     def __post_init__(self) -> None:
-        for each in (COMMAND_TIMEOUT, SLEW_LIMIT, CEILING_TOLERANCE, ON_FAULT):
+        for each in (COMMAND_TIMEOUT, CEILING_TOLERANCE, ON_FAULT):
             each.accept(getattr(self, each.name))
 
 
@@ -130,71 +122,6 @@ class Answers:
         return Health(Level.WARN, refusal) if refusal else health
 
 
-class Outlet:
-    """Set-point of the regulator of one pad, and its way to the last command.
-
-    Attributes
-    ----------
-    regulator : Regulator
-        The regulator.
-    target : float
-        Last accepted command, gauge Pa; 0 after a vent.
-    sent : float or None
-        Last set-point that the regulator accepted, gauge Pa; None before the first vent, and after
-        an error of the device.
-    vented : bool
-        Whether the last set-point is zero and the regulator accepted it; True at first.
-    moved_ns : int
-        Time of the last set-point under the slew limit, ns.
-    """
-
-    def __init__(self, regulator: Regulator) -> None:
-        self.regulator = regulator
-        self.target = 0.0
-        self.sent: float | None = None
-        self.vented = True
-        self.moved_ns = 0
-
-    def vent(self) -> bool:
-        """Vent, and return whether the pad was not vented before; raise errors of the device."""
-        self.target = 0.0
-        before, self.vented, self.sent = self.vented, False, None
-        self.regulator.vent()
-        self.vented, self.sent = True, 0.0
-        return not before
-
-    def approach(self, target: float, last: float, limit: float, elapsed_ns: int) -> None:
-        """Send the set-point nearest to a target that the slew limit allows by now.
-
-        Parameters
-        ----------
-        target : float
-            Pressure, gauge Pa.
-        last : float
-            Where to begin if it is not known which set-point is in force, gauge Pa.
-        limit : float
-            Slew limit, Pa/s; 0: none.
-        elapsed_ns : int
-            Present time, ns.
-        """
-        setpoint = target
-        if limit:
-            step = limit * max(0, elapsed_ns - self.moved_ns) * 1e-9
-            start = last if self.sent is None else self.sent
-            setpoint = min(max(target, start - step), start + step)
-        # Set even if sending fails, so that this time does not enlarge the next step.
-        self.moved_ns = elapsed_ns
-        try:
-            self.regulator.set_pressure(setpoint)
-        except (InvalidInput, LimitError):
-            raise  # the old set-point and target stay in force
-        except PadError:
-            self.vented, self.sent = False, None  # the device may have received it nevertheless
-            raise
-        self.target, self.sent = target, setpoint
-        self.vented = setpoint == target == 0.0
-
-
 class SupervisedChannel:
     """Supervise the regulator of one pad.
 
@@ -204,8 +131,7 @@ class SupervisedChannel:
     tick. A pad whose
     pressure passes the ceiling by more than ``ceiling_tolerance`` is vented and held: its commands
     are refused until :meth:`activate`. With ``on_fault`` = ``vent``, a pad that the device or the
-    monitor reports as faulty is also vented and held. The monitor needs ten readings a second, and
-    pauses while a slew limit delays the set-point.
+    monitor reports as faulty is also vented and held. The monitor needs ten readings a second.
 
     Parameters
     ----------
@@ -222,8 +148,11 @@ class SupervisedChannel:
     ----------
     pressure, setpoint : float
         Last values from the device, gauge Pa.
-    outlet : Outlet
-        Set-point of the regulator.
+    regulator : Regulator
+        As given.
+    sent : float or None
+        Last set-point that the regulator accepted, gauge Pa; None before the first vent, and after
+        an error of the device.
     answers : Answers
         Numbers of accepted and refused commands, and the last refusal.
     monitor : PadMonitor
@@ -245,7 +174,8 @@ class SupervisedChannel:
     ) -> None:
         self.leg = leg
         self.settings = settings
-        self.outlet = Outlet(regulator)
+        self.regulator = regulator
+        self.sent: float | None = None
         self.answers = Answers()
         self.monitor = PadMonitor(regulator.ceiling)
         self.pressure = self.setpoint = 0.0
@@ -269,9 +199,14 @@ class SupervisedChannel:
         return monitor.silence or device or monitor.fault or self._hold
 
     @property
+    def vented(self) -> bool:
+        """Whether the last set-point is zero and the regulator accepted it."""
+        return self.sent == 0.0
+
+    @property
     def sags(self) -> bool:
         """Whether the pad is faulty with a pressure below its set-point."""
-        monitor, sent = self.monitor, self.outlet.sent
+        monitor, sent = self.monitor, self.sent
         return bool(monitor.fault and sent and monitor.pressure < sent - monitor.tolerance)
 
     def open(self) -> None:
@@ -282,9 +217,10 @@ class SupervisedChannel:
         PadError
             When the device cannot be opened or vented; it is closed then.
         """
-        self.outlet.regulator.open()
+        self.regulator.open()
         try:
-            self.outlet.vent()
+            self.regulator.vent()
+            self.sent = 0.0
         except BaseException:
             self.close('its first vent failed')
             raise
@@ -292,10 +228,9 @@ class SupervisedChannel:
     def activate(self, elapsed_ns: int) -> None:
         """Accept commands from now on, at a time, ns, also of a pad that was held."""
         self.held, self._hold = '', Kind.NONE()
-        self.monitor = PadMonitor(self.outlet.regulator.ceiling)
+        self.monitor = PadMonitor(self.regulator.ceiling)
         # The monitor reports a silent device only after a first reading.
         self.monitor.update(elapsed_ns * 1e-9, None, self.pressure)
-        self.outlet.moved_ns = elapsed_ns
         self.active = True
 
     def deactivate(self, reason: str) -> None:
@@ -307,7 +242,7 @@ class SupervisedChannel:
         """Vent the pad and close the device; errors are logged, not raised."""
         self.deactivate(f'closing the device: {reason}')
         try:
-            self.outlet.regulator.close()
+            self.regulator.close()
         except Exception as error:
             self._log.error(f'leg {self.leg}: cannot close the device: {error}')
 
@@ -332,7 +267,7 @@ class SupervisedChannel:
         if not self.active:
             return False
         try:
-            self._approach(self._permitted(gauge_pa, age), elapsed_ns)
+            self._set(self._permitted(gauge_pa, age))
         except PadError as error:
             self.refuse(error)
             return False
@@ -360,7 +295,7 @@ class SupervisedChannel:
             self.vent(self.held or f'no set-point for {timeout:g} s')
 
     def read(self, elapsed_ns: int) -> float | None:
-        """Read the device, check device and pad, and continue towards the last command.
+        """Read the device, and check device and pad.
 
         Parameters
         ----------
@@ -372,13 +307,11 @@ class SupervisedChannel:
         float or None
             Measured pressure, gauge Pa; None when the device gave no valid reading.
         """
-        monitor, outlet, time = self.monitor, self.outlet, elapsed_ns * 1e-9
+        monitor, time = self.monitor, elapsed_ns * 1e-9
         known = monitor.silence, monitor.fault
-        # While the slew limit moves the set-point, the pad lags behind: the monitor gets None.
-        aim = outlet.sent if outlet.sent == outlet.target else None
         pressure = None
         try:
-            reading = outlet.regulator.read()
+            reading = self.regulator.read()
             if not math.isfinite(reading.pressure):
                 raise ProtocolError(
                     f'the device reports a pressure of {reading.pressure!r} Pa: a finite number is'
@@ -386,14 +319,14 @@ class SupervisedChannel:
                 )
         except PadError as error:
             self._device_faults = (str(error),)
-            monitor.update(time, aim, None)
+            monitor.update(time, self.sent, None)
             self._log.error(f'leg {self.leg}: {error}', throttle_duration_sec=1.0)
         else:
             self._device_faults = reading.faults
             self.pressure = pressure = reading.pressure
             self.setpoint = reading.setpoint
-            monitor.update(time, aim, pressure)
-            ceiling = outlet.regulator.ceiling
+            monitor.update(time, self.sent, pressure)
+            ceiling = self.regulator.ceiling
             if pressure > ceiling * (1.0 + self.settings.ceiling_tolerance):
                 fault = Kind.CEILING(pressure, ceiling)
                 self.hold(str(fault), fault)
@@ -404,7 +337,6 @@ class SupervisedChannel:
             lasting = monitor.reason if pressure is None else self.fault
             if lasting:
                 self.hold(lasting, self.present)
-        self._continue(elapsed_ns)
         return pressure
 
     def row(self, elapsed_ns: int) -> tuple[Any, ...]:
@@ -412,7 +344,7 @@ class SupervisedChannel:
         pressure = self.read(elapsed_ns)
         fault = self.present
         try:
-            pad = getattr(self.outlet.regulator, 'pad_pressure', math.nan)
+            pad = getattr(self.regulator, 'pad_pressure', math.nan)
         except PadError:  # the device is closed
             pad = math.nan
         known = (math.nan, math.nan) if pressure is None else (pressure, self.setpoint)
@@ -421,11 +353,13 @@ class SupervisedChannel:
     def vent(self, reason: str) -> None:
         """Vent the pad; a failure is logged, and the next tick tries again."""
         self.commanded_ns = None
+        news, self.sent = not self.vented, None
         try:
-            news = self.outlet.vent()
+            self.regulator.vent()
         except Exception as error:  # no error of one device may stop the vents of the others
             self._log.error(f'leg {self.leg}: cannot vent: {error}', throttle_duration_sec=1.0)
             return
+        self.sent = 0.0
         if news:
             self._log.info(f'leg {self.leg}: vented: {reason}')
 
@@ -439,7 +373,7 @@ class SupervisedChannel:
 
     def health(self) -> Health:
         """Return level and message of device and pad, without refusals."""
-        timed_out, vented = self.commanded_ns is None, self.outlet.vented
+        timed_out, vented = self.commanded_ns is None, self.vented
         faults = joined(
             self.held,
             self.fault not in self.held and self.fault,
@@ -456,7 +390,7 @@ class SupervisedChannel:
         return {
             'pressure (Pa gauge)': f'{self.pressure:.0f}',
             'set-point (Pa gauge)': f'{self.setpoint:.0f}',
-            'command (Pa gauge)': f'{self.outlet.target:.0f}',
+            'command (Pa gauge)': f'{self.sent or 0.0:.0f}',
             'set-points accepted': str(self.answers.accepted),
             'set-points refused': str(self.answers.refused),
             'time to fill (s)': f'{self.monitor.fill_time:.2f}',
@@ -472,21 +406,18 @@ class SupervisedChannel:
                 f'stamp of the set-point is {stamped}: at most {limit:g} s is accepted;'
                 ' synchronise the clocks'
             )
-        gauge = permitted(gauge_pa, self.outlet.regulator.ceiling)
+        gauge = permitted(gauge_pa, self.regulator.ceiling)
         if self.held:
             raise LimitError(f'set-point {gauge:g} Pa is not allowed: {self.held}')
         return gauge
 
-    def _approach(self, target: float, elapsed_ns: int) -> None:
-        self.outlet.approach(target, self.setpoint, self.settings.slew_limit, elapsed_ns)
-
-    def _continue(self, elapsed_ns: int) -> None:
-        """Continue towards a target that the slew limit did not allow at once."""
-        outlet = self.outlet
-        if outlet.sent == outlet.target:
-            outlet.moved_ns = elapsed_ns
-        elif outlet.sent is not None:
-            try:
-                self._approach(outlet.target, elapsed_ns)
-            except PadError as error:
-                self._log.error(f'leg {self.leg}: {error}', throttle_duration_sec=1.0)
+    def _set(self, setpoint: float) -> None:
+        """Send a set-point, gauge Pa; raise errors of the device."""
+        try:
+            self.regulator.set_pressure(setpoint)
+        except (InvalidInput, LimitError):
+            raise  # the old set-point stays in force
+        except PadError:
+            self.sent = None  # the device may have received it nevertheless
+            raise
+        self.sent = setpoint

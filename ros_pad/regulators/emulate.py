@@ -18,10 +18,7 @@ from ros_pad.configuration import choice, integer, number
 from ros_pad.errors import InvalidInput, TransportError
 from ros_pad.regulators.alicat import SOURCE_SINCE, STATUS, UNITS_SINCE
 from ros_pad.regulators.serial_device import unit
-from ros_pad.regulators.smc_itv import FULL_COUNT
-
-LINE_FAULTS = ('silence', 'half_line', 'garbage', 'unplugged')
-"""Faults of any line; each device has further ones."""
+from ros_pad.regulators.serial_text import FULL_COUNT
 
 UNIT_CODE = '10'
 """Code by which the emulated Alicat names its units."""
@@ -88,36 +85,29 @@ class Valve:
 
     Attributes
     ----------
+    setpoint : float
+        Set-point, gauge Pa.
     held : bool
         Whether the pressure stays as it is, whatever the set-point.
     """
 
     def __init__(self, time_constant: float) -> None:
         self._time_constant = number('time_constant', time_constant, 's', above=True)
-        self._time = time.monotonic()
-        self._pressure = 0.0
-        self._setpoint = 0.0
-        self.held = False
+        self._start, self._time = 0.0, time.monotonic()
+        self.setpoint, self.held = 0.0, False
 
-    @property
-    def setpoint(self) -> float:
-        """Set-point, gauge Pa."""
-        return self._setpoint
-
-    @setpoint.setter
-    def setpoint(self, value: float) -> None:
-        self.pressure  # noqa: B018 advances to the present with the old set-point
-        self._setpoint = value
+    def follow(self, setpoint: float, held: bool = False) -> None:
+        """Follow a set-point, gauge Pa, from now on, or hold the pressure."""
+        self._start, self._time = self.pressure, time.monotonic()
+        self.setpoint, self.held = setpoint, held
 
     @property
     def pressure(self) -> float:
         """Present pressure, gauge Pa."""
-        now = time.monotonic()
-        elapsed, self._time = now - self._time, now
-        if not self.held:
-            left = math.exp(-elapsed / self._time_constant)
-            self._pressure = self._setpoint + (self._pressure - self._setpoint) * left
-        return self._pressure
+        if self.held:
+            return self._start
+        left = math.exp((self._time - time.monotonic()) / self._time_constant)
+        return self.setpoint + (self._start - self.setpoint) * left
 
 
 class EmulatedDevice(ABC):
@@ -135,7 +125,10 @@ class EmulatedDevice(ABC):
         See :class:`FaultSchedule`.
     """
 
-    FAULTS: tuple[str, ...] = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
+    FAULTS: tuple[str, ...] = (
+        *('silence', 'half_line', 'garbage', 'unplugged'),  # of the line
+        *('rejection', 'analog_source', 'echo'),
+    )
     terminator = '\n'
 
     def __init__(
@@ -158,7 +151,8 @@ class EmulatedDevice(ABC):
         if self.faults.act('echo', address):
             setpoint *= 0.5
         if not self.faults.act('analog_source', address):
-            self.valves[address].setpoint = setpoint
+            valve = self.valves[address]
+            valve.follow(setpoint, valve.held)
         return setpoint
 
 
@@ -373,8 +367,7 @@ class AlicatEmulator(EmulatedDevice):
             shown = self._shown(valve.setpoint)
             return f'{address} {shown} {shown} {UNIT_CODE} {label}'
         if order in ('HP', 'C'):
-            valve.pressure  # noqa: B018 advances to the present with the old value of held
-            valve.held = order == 'HP'
+            valve.follow(valve.setpoint, held=order == 'HP')
             return self._frame(address)
         if order.startswith('S'):
             return self._set(address, order[1:])

@@ -28,17 +28,11 @@ OPEN_PATIENCE = 1.0
 """Longest time for which ``open`` waits for a device to answer, s."""
 
 RETRY = 0.25
-"""Time until a set-point that was refused or ignored is sent again, s."""
+"""Time until a set-point that was refused or ignored is sent again, and a missing port or a lost
+device is tried again, s."""
 
 LONGEST_REPLY = 256
 """Longest reply, bytes; a longer one without a terminator is an error."""
-
-FIRST_PAUSE, LONGEST_PAUSE = 0.05, 1.0
-"""First and longest pause between attempts to reach a missing port or a lost device, s; each
-pause is twice as long as the one before."""
-
-QUIET = 0.02
-"""Pause after a failure, s, so that a late reply is not read as the next one."""
 
 UNITS = {
     'Pa': 1.0,
@@ -92,8 +86,7 @@ class Bus:
 
     Devices that share a port share its bus, which the first :meth:`join` opens and the last
     :meth:`leave` closes. The next turn goes to the device with the earliest due time; a vent is
-    due at once and goes first. A port that is missing or cannot be opened is tried again, with
-    growing pauses.
+    due at once and goes first. A port that is missing or cannot be opened is tried again.
     """
 
     _all: dict[str, Bus] = {}  # noqa: RUF012 all instances share this registry on purpose
@@ -117,16 +110,7 @@ class Bus:
         ------
         ConfigError
             When the port is in use with other settings, or the address is taken.
-        TransportError
-            When pyserial is not installed.
         """
-        try:
-            import serial  # noqa: F401 only serial devices need pyserial
-        except ModuleNotFoundError as error:
-            raise TransportError(
-                f'port {line.port} cannot be opened without pyserial: pip install pyserial, or'
-                ' apt install python3-serial'
-            ) from error
         with cls._registry:
             bus = cls._all.get(line.port)
             if bus is None:
@@ -207,7 +191,7 @@ class Bus:
                     kind = TransportError
                     what = f'{"half a line" if answer else "no reply"} within'
                     what += f' {line.reply_timeout:g} s'
-            time.sleep(QUIET)
+            time.sleep(0.02)  # so that a late reply is not read as the next one
             self._port.read(self._port.in_waiting)
         except Exception as error:  # pyserial raises many types when a device disappears
             raise PortLost(
@@ -216,10 +200,10 @@ class Bus:
         raise line.error(kind, what, command, answer)
 
     def _open(self) -> None:
-        import serial
-
         line = self.line
         try:
+            import serial  # only serial devices need pyserial
+
             self._port = serial.Serial(
                 line.port,
                 line.baudrate,
@@ -251,22 +235,19 @@ class Bus:
         return None
 
     def _serve(self) -> None:
-        pause = FIRST_PAUSE
         while (device := self._next()) is not None:
             try:
                 if self._port is None:
                     self._open()
                 due = device.take_turn(self.query)
-                pause = FIRST_PAUSE
             except PortLost as error:
                 self._close()
                 with self._changed:
                     devices = list(self._due)
                 for each in devices:
-                    each.lose_port(error)
+                    each.fail(error)
                 with self._changed:
-                    self._changed.wait_for(lambda: self._closing, pause)
-                pause = min(2.0 * pause, LONGEST_PAUSE)
+                    self._changed.wait_for(lambda: self._closing, RETRY)
                 due = -math.inf
             self.schedule(device, due)
         self._close()
@@ -293,6 +274,11 @@ class Frame:
     resolution: float
     faults: tuple[str, ...] = ()
     time: float = field(default_factory=time.monotonic)
+
+    @property
+    def age(self) -> float:
+        """Time since the frame, s."""
+        return time.monotonic() - self.time
 
 
 class SerialRegulator(ABC):
@@ -344,7 +330,7 @@ class SerialRegulator(ABC):
         self._poll_period = number('poll_period', poll_period, 's', 0.0, 1.0)
         self._silence = number('silence', silence, 's', 0.05, 10.0)
         self._line = line
-        self._address = address
+        self.address = address
         self._bus: Bus | None = None
         # This lock guards what _reset() sets, which the thread of the bus uses too.
         self._changed = threading.Condition()
@@ -381,11 +367,6 @@ class SerialRegulator(ABC):
         """The highest set-point that is accepted, gauge Pa."""
         return self._ceiling
 
-    @property
-    def address(self) -> str:
-        """Name of the device, unique on its port."""
-        return self._address
-
     def open(self) -> None:
         """Identify the device. Its set-point stays as it is.
 
@@ -409,7 +390,7 @@ class SerialRegulator(ABC):
         if not known:
             self._leave()
             raise error or TransportError(
-                f'port {self._line.port}: regulator {self._address!r} did not answer within'
+                f'port {self._line.port}: regulator {self.address!r} did not answer within'
                 f' {OPEN_PATIENCE:g} s'
             )
 
@@ -422,7 +403,6 @@ class SerialRegulator(ABC):
         self._refusal = ''
         self._unconfirmed = False  # whether the last set-point was sent without an answer
         self._retry_at = -math.inf
-        self._pause = FIRST_PAUSE  # used by the thread only
 
     def set_pressure(self, gauge_pa: float) -> None:
         """Request a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``.
@@ -462,11 +442,9 @@ class SerialRegulator(ABC):
         TransportError, ProtocolError, DeviceFault, ConfigError
             The last error of the device, when it is lost. It is vented when it answers again.
         """
-        if self._bus is None:
-            raise self._closed()
         with self._changed:
             changed = self._request(0.0)
-        if changed:
+        if changed and self._bus:
             self._bus.schedule(self, -math.inf)
         with self._changed:
             self._check()
@@ -498,12 +476,6 @@ class SerialRegulator(ABC):
         if bus:
             bus.leave(self)
 
-    def _closed(self) -> TransportError:
-        return TransportError(
-            f'the regulator {self._address!r} on port {self._line.port} is not open: call open()'
-            ' first'
-        )
-
     def _request(self, setpoint: float) -> bool:
         """Store the requested set-point; return whether it is a new one. The lock is held."""
         if setpoint == self._requested:
@@ -516,17 +488,14 @@ class SerialRegulator(ABC):
 
     def _check(self) -> Frame:
         """Return the last frame; if it is too old, the device is lost. The lock is held."""
+        where = f'regulator {self.address!r} on port {self._line.port}'
         if self._bus is None:
-            raise self._closed()
-        age = math.inf if self._frame is None else time.monotonic() - self._frame.time
-        if self._frame and age <= self._silence:
+            raise TransportError(f'{where} is not open: call open() first')
+        if self._frame and self._frame.age <= self._silence:
             return self._frame
         self._lose()
-        if self._error:
-            raise self._error.with_traceback(None)  # else each time would extend it
-        raise TransportError(
-            f'port {self._line.port}: no frame of regulator {self._address!r} for {age:.3g} s'
-        )
+        error = self._error or TransportError(f'{where}: no frame for {self._silence:g} s')
+        raise error.with_traceback(None)  # else each time would extend it
 
     # --- the thread of the bus -----------------------------------------------------------------
 
@@ -539,27 +508,28 @@ class SerialRegulator(ABC):
         except Exception as error:  # an error must not end the thread, which also vents
             if not isinstance(error, PadError):
                 error = TransportError(f'port {self._line.port}: {error!r}')
-            if not self._fail(error):
-                return time.monotonic() + self._poll_period
-            pause, self._pause = self._pause, min(2.0 * self._pause, LONGEST_PAUSE)
-            return time.monotonic() + pause
-        self._pause = FIRST_PAUSE
+            self.fail(error)
+            if self._frame is None:
+                return time.monotonic() + RETRY
         return time.monotonic() + self._poll_period
 
-    def lose_port(self, error: TransportError) -> None:
-        """Treat the device as lost because its port is missing."""
+    def fail(self, error: PadError) -> None:
+        """Store an error; the device is lost after ``silence``, or at once if that is certain."""
+        # One that differs from the options counts as lost, as one whose port is missing.
+        certain = isinstance(error, (ConfigError, PortLost))
         with self._changed:
             self._error = error
-            self._lose()
+            self._retry_at = -math.inf
+            if certain or self._frame is None or self._frame.age > self._silence:
+                self._lose()
             self._changed.notify_all()
 
     def _exchange(self, query: Query) -> None:
         """Send the requested set-point if it is not in force, and store a new frame."""
         with self._changed:
             known = self._frame
-        frame = None if known else self.identify(query)
-        last = known or frame
-        assert last is not None
+        last = known or self.identify(query)
+        frame = None if known else last
         refusal = ''
         with self._changed:
             requested = self._requested
@@ -581,7 +551,7 @@ class SerialRegulator(ABC):
         if not confirmed and not refusal:
             refusal = self._refusal or (
                 f'set-point of {requested:g} Pa is not in force, but {frame.setpoint:g} Pa is:'
-                f' port {self._line.port}, regulator {self._address!r}'
+                f' port {self._line.port}, regulator {self.address!r}'
             )
         with self._changed:
             if self._frame is not known:
@@ -603,17 +573,6 @@ class SerialRegulator(ABC):
         if steps * resolution > self._ceiling * (1.0 + 1e-9):
             steps -= 1
         return steps * resolution
-
-    def _fail(self, error: PadError) -> bool:
-        """Store an error; return whether the device is lost."""
-        with self._changed:
-            self._error = error
-            self._retry_at = -math.inf
-            age = math.inf if self._frame is None else time.monotonic() - self._frame.time
-            if age > self._silence or isinstance(error, ConfigError):
-                self._lose()  # a device that differs from the options counts as lost, too
-            self._changed.notify_all()
-            return self._frame is None
 
     def _lose(self) -> None:
         """Treat the device as lost and request a vent. The lock is held."""

@@ -11,6 +11,9 @@ from ros_pad.errors import DeviceFault, InvalidInput, ProtocolError
 from ros_pad.regulators.protocol import CEILING
 from ros_pad.regulators.serial_device import Frame, Query, SerialLine, SerialRegulator
 
+FULL_COUNT = 1023
+"""Setting of an SMC ITV at full scale: 10 bits."""
+
 _VALUE = r'[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?'
 _FIELD = re.compile(r'\{(channel|value(?::(?:\.(\d)f|d))?)\}')
 
@@ -34,7 +37,10 @@ class SerialTextRegulator(SerialRegulator):
         that was sent. Empty when the board sends no reply.
     read_template, read_reply : str
         Command that requests the measured value, and the reply to it, in which ``{value}`` is any
-        number.
+        number, and ``{value:d}`` a whole one without a sign.
+    setpoint_template : str
+        Command that requests the set-point in force; the reply is as to ``set_template``. Empty
+        when the board does not report it.
     terminator : str
         End of a line, in both directions: 1 to 4 ASCII characters.
     command_zero, command_full : float
@@ -53,12 +59,12 @@ class SerialTextRegulator(SerialRegulator):
 
     Notes
     -----
-    Values are linear in the pressure. The board does not report its set-point: the last one that
-    was sent and not refused counts as in force; before the first one it is NaN. A reply other than
-    ``set_reply`` is a refusal.
+    Values are linear in the pressure. If the board does not report its set-point, the last one
+    that was sent and not refused counts as in force; before the first one it is NaN. A reply other
+    than ``set_reply`` is a refusal.
 
-    A board that restarts loses its set-point, which is not detected while its port stays open. If
-    opening the port restarts the board, it receives its first set-point after that.
+    A board that restarts loses its set-point, which is then not detected while its port stays
+    open. If opening the port restarts the board, it receives its first set-point after that.
     """
 
     def __init__(
@@ -69,6 +75,7 @@ class SerialTextRegulator(SerialRegulator):
         set_reply: str = 'OK {channel} {value}',
         read_template: str = 'READ {channel}',
         read_reply: str = '{channel} {value}',
+        setpoint_template: str = '',
         terminator: str = '\n',
         command_zero: float = 0.0,
         command_full: float = 5.0,
@@ -88,9 +95,10 @@ class SerialTextRegulator(SerialRegulator):
             )
         for name, template, values in [
             ('set_template', set_template, (1,)),
-            ('set_reply', set_reply, (0, 1)),
+            ('set_reply', set_reply, (1,) if setpoint_template else (0, 1)),
             ('read_template', read_template, (0,)),
             ('read_reply', read_reply, (1,)),
+            ('setpoint_template', setpoint_template, (0,)),
         ]:
             _check(name, template, values)
         self._full_scale = number('full_scale', full_scale, 'Pa', 1e3, 1e7)
@@ -107,7 +115,9 @@ class SerialTextRegulator(SerialRegulator):
             )
         self._set_template = set_template
         self._read_command = _filled(read_template, channel, '')
-        self._set_reply = _pattern(set_reply, channel) if set_reply else None
+        self._setpoint_command = _filled(setpoint_template, channel, '')
+        self._answers = bool(set_reply)
+        self._set_reply = _pattern(set_reply, channel)
         self._read_reply = _pattern(read_reply, channel)
         self._channel = channel
         self._in_force = math.nan
@@ -120,15 +130,26 @@ class SerialTextRegulator(SerialRegulator):
         return self.poll(query)
 
     def poll(self, query: Query) -> Frame:
-        """Request the measured value; return a frame."""
-        reply = query(self._read_command)
-        found = self._read_reply.fullmatch(reply)
-        zero, span = self._monitor
+        """Request the measured value, and the set-point if the board reports it."""
+        if self._setpoint_command:
+            known = (self._setpoint_command, self._set_reply, self._command)
+            self._in_force = self._requested_value(query, *known)
+        pressure = self._requested_value(
+            query, self._read_command, self._read_reply, self._monitor
+        )
+        return Frame(pressure, self._in_force, self._resolution)
+
+    def _requested_value(
+        self, query: Query, command: str, form: re.Pattern[str], scale: tuple[float, float]
+    ) -> float:
+        """Return the pressure that a board answers to a command, gauge Pa."""
+        reply, (zero, span) = query(command), scale
+        found = form.fullmatch(reply)
         pressure = (float(found['value']) - zero) / span * self._full_scale if found else math.nan
         if not math.isfinite(pressure):  # the pattern accepts 1e999, which is infinite
-            what = 'the reply does not match read_reply with a finite value'
-            raise self.error(ProtocolError, what, self._read_command, reply)
-        return Frame(pressure, self._in_force, self._resolution)
+            what = f'the reply does not match {form.pattern!r} with a finite value'
+            raise self.error(ProtocolError, what, command, reply)
+        return pressure
 
     def send(self, query: Query, setpoint: float) -> None:
         """Send a set-point, gauge Pa, and check the reply if there is one."""
@@ -136,8 +157,8 @@ class SerialTextRegulator(SerialRegulator):
         value = f'{zero + setpoint / self._full_scale * span:.{self._decimals}f}'
         command = _filled(self._set_template, self._channel, value)
         self._in_force = math.nan
-        reply = query(command, reply=self._set_reply is not None)
-        if self._set_reply:
+        reply = query(command, reply=self._answers)
+        if self._answers:
             found = self._set_reply.fullmatch(reply)
             if not found:
                 what = 'the reply does not match set_reply'
@@ -147,6 +168,44 @@ class SerialTextRegulator(SerialRegulator):
                 what = f'value {value} was sent, {echo:g} is in force'
                 raise self.error(DeviceFault, what, command, reply)
         self._in_force = setpoint
+
+
+def smc_itv(
+    port: str,
+    full_scale: float,
+    baudrate: int = 9600,
+    ceiling: float = CEILING,
+    reply_timeout: float = 0.1,
+    poll_period: float = 0.02,
+    silence: float = 0.5,
+) -> SerialTextRegulator:
+    """Return one SMC ITV with RS-232C, on a port of its own.
+
+    ``full_scale`` is the gauge pressure at the setting 1023, Pa, from the type plate: the device
+    does not report it. The other options are those of :class:`SerialTextRegulator`.
+
+    The reply to ``SET n`` is n, to ``REQ`` the setting and to ``MON`` the output, all from 0 to
+    1023; ``UNKNOWN COMMAND`` is a rejection. The device reports no faults. Source: two independent
+    field programs; the maker's manual was not found.
+    """
+    return SerialTextRegulator(
+        port,
+        set_template='SET {value:d}',
+        set_reply='{value:d}',
+        read_template='MON',
+        read_reply='{value:d}',
+        setpoint_template='REQ',
+        terminator='\r\n',
+        command_full=FULL_COUNT,
+        monitor_zero=0.0,
+        monitor_full=FULL_COUNT,
+        full_scale=full_scale,
+        baudrate=baudrate,
+        ceiling=ceiling,
+        reply_timeout=reply_timeout,
+        poll_period=poll_period,
+        silence=silence,
+    )
 
 
 def _decimals(set_template: str, command_zero: float) -> int:
@@ -196,6 +255,7 @@ def _pattern(template: str, channel: int) -> re.Pattern[str]:
     end = 0
     for each in _FIELD.finditer(template):
         parts.append(re.escape(template[end : each.start()]))
-        parts.append(str(channel) if each[1] == 'channel' else f'(?P<value>{_VALUE})')
+        number = '[0-9]+' if each[1] == 'value:d' else _VALUE
+        parts.append(str(channel) if each[1] == 'channel' else f'(?P<value>{number})')
         end = each.end()
     return re.compile(''.join(parts) + re.escape(template[end:]))

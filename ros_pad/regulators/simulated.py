@@ -65,8 +65,8 @@ class SimulatedRegulator:
     -----
     The pressure is measured at the pad. Internal steps of ``STEP`` restart at every change of
     the set-point, so the pressure depends only on the commands and their times. A reading
-    between two internal steps is computed on a copy, so readings do not change the result. Noise
-    is drawn once for each time that is read. Long times at rest are computed in one step.
+    between two internal steps is computed on a copy, so readings do not change the result. Long
+    times at rest are computed in one step.
 
     Examples
     --------
@@ -117,8 +117,6 @@ class SimulatedRegulator:
         hose = Hose(hose_diameter, hose_length, hose_conductance)
         self._faults = parsed(faults)
         self._channel = PneumaticChannel(model, hose, pad_volume, faults=self._faults)
-        self._copy, self._copied = self._channel, -math.inf  # of which time it is, s
-        self._disturbance = (-math.inf, 0.0)  # time, s, and noise, Pa
         self._is_open = False
         self._now = 0.0  # time of the last call
         self._rest = 0.0  # time since the last internal step, s
@@ -129,11 +127,6 @@ class SimulatedRegulator:
     def ceiling(self) -> float:
         """Highest accepted set-point, gauge Pa."""
         return self._ceiling
-
-    @property
-    def air_used(self) -> float:
-        """Mass of air drawn from the regulator since the start, kg, up to the last step."""
-        return self._channel.air_used
 
     @property
     def pad_pressure(self) -> float:
@@ -150,7 +143,8 @@ class SimulatedRegulator:
             now = self._clock()
             self._check_answer(now)
             self._is_open = True
-            self._now = self._epoch = self._channel.time = now
+            self._now = self._epoch = now
+            self._channel.start(now)
             self._rest, self._steps = 0.0, 0
 
     def set_pressure(self, gauge_pa: float) -> None:
@@ -189,9 +183,7 @@ class SimulatedRegulator:
             acting = [each for each in self._faults if each.acts_at(self._now)]
             pressure += condition(acting, self._now, channel.regulator.full_scale).offset
         if self._noise:
-            if self._now != self._disturbance[0]:
-                self._disturbance = self._now, self._random.gauss(0.0, self._noise)
-            pressure += self._disturbance[1]
+            pressure += self._random.gauss(0.0, self._noise)
         return Reading(self._shown(pressure), channel.setpoint, (), self._now)
 
     def vent(self) -> None:
@@ -221,10 +213,9 @@ class SimulatedRegulator:
         rest = self._advance()
         if not rest:
             return self._channel
-        if self._now != self._copied:
-            self._copied, self._copy = self._now, copy.copy(self._channel)
-            self._copy.step(self._copy.setpoint, rest)
-        return self._copy
+        channel = copy.copy(self._channel)
+        channel.step(channel.setpoint, rest)
+        return channel
 
     def _advance(self) -> float:
         """Advance by whole internal steps; return the remaining time, s, below ``STEP``."""
@@ -245,9 +236,7 @@ class SimulatedRegulator:
         while self._steps < steps:
             count = 1
             if channel.settled:
-                count = steps - self._steps
-                if self._faults:
-                    count = max(1, int(min(count, channel.quiet_time / STEP)))
+                count = max(1, int(min(steps - self._steps, channel.quiet_time / STEP)))
             channel.step(channel.setpoint, count * STEP)
             self._steps += count
         rest = elapsed - steps * STEP

@@ -93,7 +93,7 @@ class Supervision:
         set_back, self._ticked_ns = elapsed_ns < self._ticked_ns, elapsed_ns
         for channel in self.channels:
             if channel.commanded_ns is None:
-                if not channel.outlet.vented:
+                if not channel.vented:
                     channel.vent(channel.held or 'an earlier vent was not confirmed')
             elif set_back:
                 channel.vent('the clock was set back')
@@ -108,7 +108,7 @@ class Supervision:
 
 def supply_health(channels: Sequence[SupervisedChannel]) -> Health:
     """Return level and message of the air supply that all channels share."""
-    filled = [each for each in channels if each.outlet.sent]
+    filled = [each for each in channels if each.sent]
     sagging = [str(each.leg) for each in filled if each.sags]
     # One sagging pad has a leak; when most of them sag, the supply is low.
     if len(sagging) > max(1, len(filled) // 2):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -15,7 +16,7 @@ from ros_pad.simulation import planar_step
 # 0.3 s). For fewer steps, compiling would make a trial slower.
 WORTH_LOADING = 150_000
 
-Walk = Callable[..., bool]
+Step = Callable[..., bool]
 
 
 def worth_loading(steps: float) -> bool:
@@ -29,8 +30,8 @@ def worth_loading(steps: float) -> bool:
     )
 
 
-def walk(*arguments: Any) -> Walk:
-    """Return :func:`ros_pad.simulation.planar_step.walk`, compiled for the types of the arguments.
+def step(*arguments: Any) -> Step:
+    """Return :func:`ros_pad.simulation.planar_step.step`, compiled for the types of the arguments.
 
     The compiled copy is kept on disk beside the source, or where numba can write: making it takes
     4 s, loading it 0.3 s. The returned function takes only arguments of these types
@@ -42,21 +43,22 @@ def walk(*arguments: Any) -> Walk:
         Without numba; the message names the extra that installs it.
     """
     made, typeof = dispatcher()
-    compiled: Walk = made.compile(tuple(map(typeof, arguments)))
+    compiled: Step = made.compile(tuple(map(typeof, arguments)))
     return compiled
 
 
 @cache
 def dispatcher() -> tuple[Any, Callable[[Any], Any]]:
-    """Return numba's dispatcher of the walk, and numba's ``typeof``; both are made only once."""
+    """Return numba's dispatcher of the step, and numba's ``typeof``; both are made only once."""
     try:
         import numba
     except ImportError as error:
         raise ConfigError('compiled steps need numba: pip install "ros_pad[fast]"') from error
-    for function in planar_step.PARTS:
-        numba.extending.register_jitable(error_model='numpy')(function)
+    for part in vars(planar_step).values():
+        if inspect.isfunction(part) and part is not planar_step.step:
+            numba.extending.register_jitable(error_model='numpy')(part)
     try:
-        made = numba.njit(cache=True, error_model='numpy')(planar_step.walk)
+        made = numba.njit(cache=True, error_model='numpy')(planar_step.step)
     except RuntimeError:  # numba finds no folder that is writable
-        made = numba.njit(error_model='numpy')(planar_step.walk)
+        made = numba.njit(error_model='numpy')(planar_step.step)
     return made, numba.typeof

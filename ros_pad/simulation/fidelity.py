@@ -19,12 +19,11 @@ from ros_pad.configuration import choice, shared_folder
 from ros_pad.contact import LARGE_PAD
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.margin import features, reserve
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.scene import RAIL_LEG, LeggedBody, Scene
+from ros_pad.simulation.scene import RAIL_LEG, Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.yaml_text import read_yaml
 
@@ -90,10 +89,9 @@ class Promises:
             ) from error
 
     def bound(self, level: str, scene: Scene, policy: str | None = None) -> float:
-        """Return the bound on the error of a level, at least LEAST; infinite if none was drawn."""
-        bounds = self.robots.get(scene.robot, {}).get('bounds', {})
-        line = bounds.get(f'{level} {scene.metric}')
-        if line is None:
+        """Return the bound on the error of a level, at least LEAST; infinite if there is none."""
+        line = self.robots.get(scene.robot, {}).get('bounds', {}).get(f'{level} {scene.metric}')
+        if line is None or self.beyond(scene, policy):
             return math.inf
         known = features(scene, policy)
         power = line['constant'] + sum(line[name] * value for name, value in known.items())
@@ -116,16 +114,14 @@ class Promises:
             and not low - 1e-9 * abs(low) <= known[name] <= high + 1e-9 * abs(high)
         ]
         usual = (scene.foot.pad, scene.foot.limit) == (LARGE_PAD, 'measured')
-        for word, holds in {
+        others = {
             'pads, drawn were large ones with the force limit as measured': not usual,
             'a measured conductance of the hose': 'hose_conductance' in scene.regulator,
             'faults': scene.faults,
             'a floor as in a drawing': scene.floor.kind == 'drawn',
             f'phases or pushes of the gait, drawn were those of {scene.robot}': not _usual(scene),
-        }.items():
-            if holds:
-                found.append(word)
-        return ', '.join(found)
+        }
+        return ', '.join(found + [word for word, holds in others.items() if holds])
 
 
 def value_of(scene: Scene, name: str) -> Any:
@@ -138,11 +134,10 @@ def value_of(scene: Scene, name: str) -> Any:
 
 def _usual(scene: Scene) -> bool:
     """Return whether the gait has the phases and pushes that walked in the study."""
-    gait = scene.gait
-    if not isinstance(gait, WalkingGait):
+    if scene.robot == RAIL_LEG:
         return True
-    assert isinstance(scene.body, LeggedBody)
-    usual = scene.body.robot.gait
+    body, gait = scene.legged
+    usual = body.robot.gait
     if usual is None or not gait.pushes:
         return False
     shifts = [a - b for a, b in zip(gait.middles, usual.phases, strict=True)]
@@ -170,11 +165,7 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         When the level does not exist, or does not model the scene's robot.
     """
     known, promises = _levels(scene, fidelity), Promises.load()
-    beyond = promises.beyond(scene, policy)
-    bounds = {
-        level: math.inf if beyond else promises.bound(level, scene, policy)
-        for level in (STICKING, *known)
-    }
+    bounds = {level: promises.bound(level, scene, policy) for level in (STICKING, *known)}
     missing = 'L2' in known and importlib.util.find_spec('mujoco') is None
     level = fidelity
     if fidelity == 'auto':
@@ -182,6 +173,7 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         enough = [each for each in available if bounds[each] <= scene.accuracy]
         level = (enough or available[-1:])[0]
     bound = bounds[level]
+    beyond = promises.beyond(scene, policy)
     within = f'of unknown error ({beyond})' if beyond else _promised(bound)
     note = f'{_grip(scene, policy)}: the {scene.metric} on {level} is {within}'
     if bound > scene.accuracy:
@@ -198,11 +190,8 @@ def answer(scene: Scene, policy: str | None = None) -> ChosenLevel | None:
 
     It requires more if it wants the walk itself, not only the metric, or more accuracy.
     """
-    promises = Promises.load()
-    if scene.wanted != 'metric' or promises.beyond(scene, policy):
-        return None
-    bound = promises.bound(STICKING, scene, policy)
-    if bound > scene.accuracy:
+    bound = Promises.load().bound(STICKING, scene, policy)
+    if scene.wanted != 'metric' or bound > scene.accuracy:
         return None
     note = (
         f'{_grip(scene, policy)}: the {scene.metric} of feet that never slip is'

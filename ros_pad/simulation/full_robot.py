@@ -25,15 +25,13 @@ from ros_pad.robots.rotation import Array
 from ros_pad.signals import children_spared
 from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings, mjcf, tow_step
 from ros_pad.simulation.robot import FootState, Proprioception, Vector, check_reach
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.servos import Servos
 from ros_pad.simulation.soles import Sled, Soles
 from ros_pad.simulation.terrain import Floor
 
 TIPPED = 0.5
 """Angle between trunk and normal of the floor, rad, at which the walk ends with a verdict."""
-
-_UPRIGHT = math.cos(TIPPED)
 
 _FAR = 1e6  # m: if the body is farther away than this, the solution has diverged
 
@@ -101,9 +99,9 @@ class FullRobot:
         settings: SolverSettings = RECOMMENDED,
     ) -> None:
         mujoco = _import_mujoco()
-        assert isinstance(scene.body, LeggedBody)
+        body, _ = scene.legged
+        robot = body.robot
         number('period', period, 's', above=True)
-        robot, low = scene.body.robot, scene.body.ground
         if robot.servo is None:
             raise ConfigError(
                 f'{scene.source}: fidelity L2 needs servos: the file of {scene.robot} has no'
@@ -129,7 +127,7 @@ class FullRobot:
         self.soles = Soles(scene, floor, period, dt, self.model, self.data)
         self._sled = Sled(scene.tow, floor, self.model, self.data) if scene.tow.weight else None
         self._senses = _Senses(mujoco, self.model, self.data, scene, period)
-        self._place(-low)
+        self._place(-body.ground)
 
     @property
     def feet(self) -> list[FootState]:
@@ -219,7 +217,7 @@ class FullRobot:
         """Set the verdict when the body tips over or a joint is far from its set-point."""
         state = self._state.tolist()
         upright = 1.0 - 2.0 * (state[4] * state[4] + state[5] * state[5])
-        if upright < _UPRIGHT:
+        if upright < math.cos(TIPPED):
             self._end(f'tip-over: the body leans {math.acos(max(-1.0, upright)):.2f} rad')
         elif lost := self._servos.lost(state[7:]):
             self._end(lost)
@@ -238,8 +236,7 @@ class _Senses:
     """
 
     def __init__(self, mujoco: Any, model: Any, data: Any, scene: Scene, period: float) -> None:
-        assert isinstance(scene.body, LeggedBody)
-        robot, first = scene.body.robot, model.geom('foot_1').id
+        robot, first = scene.legged[0].robot, model.geom('foot_1').id
         self._to_matrix = mujoco.mju_quat2Mat
         self._imu = robot.imu
         self._data = data
@@ -263,15 +260,12 @@ class _Senses:
         # The damping of the joints is the back-EMF of their motors.
         efforts = data.qfrc_actuator[moving] + data.qfrc_passive[moving]
         return Proprioception(
-            tuple((data.qvel[3:6] @ to_imu).tolist()),
-            tuple((pull @ turn @ to_imu).tolist()),
-            data.qpos[moving.start + 1 : moving.stop + 1].tolist(),
-            data.qvel[moving].tolist(),
-            efforts.tolist(),
-            [
-                tuple((turn.T @ force).tolist())
-                for turn, force in zip(self._turns, forces, strict=True)
-            ],
+            data.qvel[3:6] @ to_imu,
+            pull @ turn @ to_imu,
+            data.qpos[moving.start + 1 : moving.stop + 1].copy(),
+            data.qvel[moving].copy(),
+            efforts,
+            np.array([turn.T @ force for turn, force in zip(self._turns, forces, strict=True)]),
         )
 
     def _motion(self, places: Array, speeds: Array) -> tuple[Array, Array]:

@@ -15,6 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from ros_pad.simulation import planar_step
+
 SHORTEST_OVERLAP = 0.02
 """Least share of the cycle in which a foot takes over its load."""
 
@@ -76,16 +78,7 @@ class WalkingGait:
 
     def body_advance(self, time: float) -> float:
         """Return the intended advance of the body since time zero, m."""
-        speed = self.stride / self.cycle
-        if self.pushes:
-            angle = 4.0 * math.pi * time / self.cycle
-            return speed * (time - self.cycle / (4.0 * math.pi) * math.sin(angle))
-        if time <= 0.0:  # feet are placed as if the gait had run before
-            return speed * time
-        if time >= self.cycle:
-            return speed * (time - 0.5 * self.cycle)
-        angle = math.pi * time / self.cycle
-        return 0.5 * speed * (time - self.cycle / math.pi * math.sin(angle))
+        return planar_step.body_advance(self, time)
 
     @property
     def peak_acceleration(self) -> float:
@@ -106,11 +99,6 @@ class WalkingGait:
         half = self.duty * self.cycle / 2.0
         middle = self.cycle / 4.0
         return self.body_advance(middle + half) - self.body_advance(middle)
-
-    def stroke(self, index: int, time: float) -> tuple[float, float] | None:
-        """Return :meth:`swing` of a leg at a time, s; None while its foot stands."""
-        phase = self.phase(index, time)
-        return self.swing(phase) if phase >= self.duty else None
 
     def swing(self, phase: float) -> tuple[float, float]:
         """Return the progress of a swing, 0 to 1, and the height of the foot, m, at a phase.
@@ -145,18 +133,17 @@ class FootPath:
         self._homes = homes
         self._reach = gait.reach()
         self._advance = gait.body_advance(0.0)
-        # Legs of one group have one phase: only that of the first of them is computed.
-        self._firsts = [gait.middles.index(each) for each in gait.middles]
         self._offsets: list[tuple[float, float]] = []
+        self.swings: list[bool] = []
         for leg in range(len(homes)):
             phase = gait.phase(leg, 0.0)
-            if phase < gait.duty:
-                ahead = self._reach + gait.body_advance(-phase * gait.cycle)
-            else:
+            self.swings.append(phase >= gait.duty)
+            if self.swings[leg]:
                 ahead = (2.0 * gait.swing(phase)[0] - 1.0) * self._reach
+            else:
+                ahead = self._reach + gait.body_advance(-phase * gait.cycle)
             self._offsets.append((ahead, 0.0))
         self._lifted = list(self._offsets)
-        self.swings = [gait.phase(leg, 0.0) >= gait.duty for leg in range(len(homes))]
         self.feet = list(homes)
         self.move(0.0, 0.0)
 
@@ -164,19 +151,19 @@ class FootPath:
         """Move the feet to a time of the gait, s, to turn the body by an angle, rad, meanwhile."""
         before, self._advance = self._advance, self._gait.body_advance(time)
         advance = self._advance - before
-        own = {first: self._gait.stroke(first, time) for first in {*self._firsts}}
-        strokes = [own[first] for first in self._firsts]
-        offsets, feet, swings = self._offsets, self.feet, self.swings
-        self.swings = [stroke is not None for stroke in strokes]
-        places = zip(self._homes, offsets, strokes, strict=True)
-        for index, ((home_x, home_y, height), (x, y), stroke) in enumerate(places):
-            if stroke is None:
+        offsets, feet, gait = self._offsets, self.feet, self._gait
+        swings, self.swings = self.swings, []
+        for index, (home_x, home_y, height) in enumerate(self._homes):
+            x, y = offsets[index]
+            phase = gait.phase(index, time)
+            self.swings.append(phase >= gait.duty)
+            if phase < gait.duty:
                 # The foot moves in the body against the motion of the body.
                 x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
             else:
                 if not swings[index]:
                     self._lifted[index] = (x, y)
-                progress, rise = stroke
+                progress, rise = gait.swing(phase)
                 height += rise
                 from_x, from_y = self._lifted[index]
                 x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)

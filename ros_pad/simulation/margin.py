@@ -15,10 +15,6 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import NoEquilibrium
 from ros_pad.simulation.scene import LeggedBody, RailBody, RailGait, Scene
 
-SOLE_MODULUS = 3.95e5
-"""Reduced modulus of a sole whose foot names no material, Pa: of Dragon Skin 10, four times its
-shear modulus, 2 C1 of ``config/materials``, times 1.88 by which that is too soft for the domes."""
-
 NEAR = 1.5
 """Grip margin below which feet may slip: bounds may step there."""
 

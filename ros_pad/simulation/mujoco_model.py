@@ -16,14 +16,13 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array, quaternion
-from ros_pad.simulation.scene import LeggedBody, Scene, Tow
+from ros_pad.simulation.scene import Scene, Tow
 
 ROLL_SHARE = 0.6  # inertia of the trunk about x, or about y, over that about z, assumed
 
 # Radius of the ball that stands for the sole: too small to roll noticeably as the tibia tilts.
 POINT = 1e-4  # m
 
-_OWN_BODIES = ('world', 'trunk', 'sled')
 _SHORTEST = 1e-4  # s: a towed load that needs shorter steps is refused
 
 
@@ -74,9 +73,9 @@ def tow_step(scene: Scene) -> float:
     tow = scene.tow
     if not tow.weight:
         return math.inf
-    assert isinstance(scene.body, LeggedBody)
-    legs = sum(joint.mass for leg in scene.body.robot.chains.legs for joint in leg)
-    trunk = scene.body.mass * (1.0 - legs / scene.body.robot.mass)
+    body, _ = scene.legged
+    legs = sum(joint.mass for leg in body.robot.chains.legs for joint in leg)
+    trunk = body.mass * (1.0 - legs / body.robot.mass)
     longest = 1.0 / math.sqrt(tow.stiffness * (GRAVITY / tow.weight + 1.0 / trunk))
     if longest < _SHORTEST:
         raise ConfigError(
@@ -106,8 +105,8 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
     ConfigError
         When the legs alone have more inertia than the scene's body.
     """
-    body, tow, slope = scene.body, scene.tow, scene.floor.slope
-    assert isinstance(body, LeggedBody) and body.robot.servo is not None
+    (body, _), tow, slope = scene.legged, scene.tow, scene.floor.slope
+    assert body.robot.servo is not None
     robot, servo = body.robot, body.robot.servo
     grounds, trees, pairs, sensors = [], [], [], []
     for leg in scene.legs:
@@ -168,8 +167,7 @@ def _trunk_inertial(scene: Scene) -> str:
     ConfigError
         When the legs alone have more inertia than the scene's body.
     """
-    body = scene.body
-    assert isinstance(body, LeggedBody)
+    body, _ = scene.legged
     robot, scale = body.robot, body.mass / body.robot.mass
     centre = np.array((*robot.centre, body.height + body.ground))
     legs, yaw, moment = 0.0, body.inertia, body.mass * centre
@@ -208,7 +206,7 @@ def _leg_xml(leg: int, robot: Robot, scale: float) -> str:
     for place, joint in enumerate(joints):
         end = joints[place + 1].at[:3, 3] if place + 1 < len(joints) else foot
         kind = 'type="slide" ' if joint.slides else ''
-        link = joint.name + '_link' * (joint.name in _OWN_BODIES)
+        link = joint.name + '_link' * (joint.name in ('world', 'trunk', 'sled'))
         text += (
             f'<body name="{escape(link)}" {at_frame(joint.at)}>'
             f'<joint {kind}name="{escape(joint.name)}"'

@@ -8,8 +8,7 @@ from collections import namedtuple
 from typing import Any
 
 from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import CELL, WIDTH, Floor
 
 # SI units; most have the names and meanings of the parts of a scene.
@@ -48,8 +47,7 @@ PlanarFloor = namedtuple(
 
 def model_of(scene: Scene, floor: Floor, period: float) -> PlanarModel:
     """Return the constants of a walk of a scene's robot on a floor."""
-    body, gait, tow, slope = scene.body, scene.gait, scene.tow, scene.floor.slope
-    assert isinstance(body, LeggedBody) and isinstance(gait, WalkingGait)
+    (body, gait), tow, slope = scene.legged, scene.tow, scene.floor.slope
     foot, viscosity = scene.foot.on_rough(scene.floor.roughness), scene.floor.viscosity
     down, heights = GRAVITY * math.cos(slope), floor.heights
     rocks = 1e-9 * max(x * x + y * y for x, y in body.homes)

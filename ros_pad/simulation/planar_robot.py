@@ -17,14 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.configuration import instance, integer, number
+from ros_pad.configuration import instance, number
 from ros_pad.errors import NoConvergence
 from ros_pad.records import Array
 from ros_pad.simulation import compiled, planar_step
-from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.planar_model import model_of
 from ros_pad.simulation.robot import FootState, Vector, check_pressures, check_reach
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
 # Rows of the table that become attributes of FootState; the first seven are the contacts.
@@ -72,8 +71,8 @@ class PlanarRobot:
     >>> from ros_pad.simulation import Floor, PlanarRobot, Scene
     >>> scene = Scene.load('hexapod_patches')
     >>> robot = PlanarRobot(scene, Floor.uniform(True, 0.3e-3), period=2e-3, compile_steps=False)
-    >>> robot.walk([75e3] * 6, steps=3000)
-    3000
+    >>> for _ in range(3000):
+    ...     robot.step([75e3] * 6)
     >>> f'{robot.body[0]:.2f} m'
     '0.70 m'
     """
@@ -85,9 +84,7 @@ class PlanarRobot:
         self, scene: Scene, floor: Floor, period: float, compile_steps: bool | None = None
     ) -> None:
         instance('scene', scene, Scene)
-        instance('scene.body', scene.body, LeggedBody)
         instance('floor', floor, Floor)
-        assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
         check_reach(scene)
         if compile_steps is None:
@@ -98,12 +95,11 @@ class PlanarRobot:
         self.dissipation = 0.0
         self.verdict: str | None = None
         self._feet = [FootState() for _ in self.legs]
-        self._fresh = False
         self.model = model_of(scene, floor, period)
         self.state: Any = [0.0] * planar_step.BODY
         self.table: Any = [[0.0] * len(self.legs) for _ in range(planar_step.FEET)]
         self._plant()
-        self._walk: compiled.Walk = planar_step.walk
+        self._step: compiled.Step = planar_step.step
         if compile_steps:
             self._compile()
         self._report()
@@ -114,7 +110,7 @@ class PlanarRobot:
         for index in range(len(self.legs)):
             phase = (gait.duty / 2.0 - gait.middles[index]) % 1.0
             if phase < gait.duty:
-                offset = gait.reach + planar_step.body_advance(model, -phase * gait.cycle)
+                offset = gait.reach + planar_step.body_advance(gait, -phase * gait.cycle)
             else:
                 offset = -gait.reach * math.cos(math.pi * (phase - gait.duty) / (1.0 - gait.duty))
             table[planar_step.PHASE][index] = phase
@@ -130,7 +126,7 @@ class PlanarRobot:
             foot=model.foot._replace(limits=np.array(model.foot.limits)),
             floor=floor._replace(wet=np.array(floor.wet), heights=np.array(floor.heights)),
         )
-        self._walk = compiled.walk(self.model, self.state, self.table, (0.0,) * len(self.legs), 1)
+        self._step = compiled.step(self.model, self.state, self.table, (0.0,) * len(self.legs))
 
     @property
     def body(self) -> Vector:
@@ -153,43 +149,8 @@ class PlanarRobot:
         NoConvergence
             When the friction step does not converge.
         """
-        self._advance(pressures, 1)
-
-    def walk(self, pressures: Sequence[float], steps: int) -> int:
-        """Make many steps with the same pressures.
-
-        The result is that of as many calls of :meth:`step`, but compiled code makes all of them in
-        one call. The walk ends early when the robot tips over.
-
-        Parameters
-        ----------
-        pressures : sequence of float
-            Gauge pressure of the pads of each leg, Pa, from 0.
-        steps : int
-            Number of steps, from 0.
-
-        Returns
-        -------
-        int
-            Number of steps made.
-
-        Raises
-        ------
-        InvalidInput
-            When there is not one finite pressure for each leg, or ``steps`` is not a whole
-            number from 0.
-        NoConvergence
-            When a friction step does not converge.
-        """
-        integer('steps', steps)
-        before = self.state[planar_step.STEPS]
-        self._advance(pressures, steps)
-        return round(self.state[planar_step.STEPS] - before)
-
-    def _advance(self, pressures: Sequence[float], steps: int) -> None:
         check_pressures(pressures, len(self.legs))
-        converged = self._walk(self.model, self.state, self.table, tuple(pressures), steps)
-        if not converged:
+        if not self._step(self.model, self.state, self.table, tuple(pressures)):
             raise NoConvergence(
                 f'friction step of {self.period:g} s does not converge: shorten the period, or'
                 ' lower shear_stiffness of the foot'
@@ -200,7 +161,6 @@ class PlanarRobot:
         body = self.state
         self.time = float(body[planar_step.STEPS] * self.period)
         self.dissipation = float(body[planar_step.LOST])
-        self._fresh = False
         if self.verdict is None and body[planar_step.TIPPED] > 0.0:
             leg = int(body[planar_step.TIPPED])
             pulls = leg <= len(self.legs)
@@ -215,9 +175,6 @@ class PlanarRobot:
     @property
     def feet(self) -> list[FootState]:
         """State of each foot, updated on access; the objects stay the same."""
-        if self._fresh:
-            return self._feet
-        self._fresh = True
         table = self.table if isinstance(self.table, list) else self.table.tolist()
         for state, (fx, fy, load, moment, x, y, z, cap, wet, speed, path, overload) in zip(
             self._feet, zip(*(table[row] for row in _SHOWN), strict=True), strict=True

@@ -16,9 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, exp, inf, pi, sin, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ros_pad.simulation.planar_model import PlanarModel
+if TYPE_CHECKING:
+    from ros_pad.simulation.planar_model import PlanarModel
 
 # A contact in a step: lever arm x, y, m; velocity x, y, m/s, and yaw rate, rad/s, at which the
 # contact would slide if the body stood still; turning radius, m; cap of its force, N; force over
@@ -89,7 +90,7 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Floats) -> bool:
     vx, vy, yaw_rate, converged = newton(
         (free_x, last_y, body[YAW_RATE]),
         model.trunk.mass + towed, model.trunk.inertia, contacts, dt,
-        (last_x, last_y, body[YAW_RATE]), 0.0,
+        (last_x, last_y, body[YAW_RATE]),
     )  # fmt: skip
     if not converged:
         return False
@@ -108,20 +109,6 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Floats) -> bool:
     return True
 
 
-def walk(model: PlanarModel, body: Any, feet: Any, pressures: Floats, count: int) -> bool:
-    """Make ``count`` steps with the same gauge pressures, Pa, or fewer if the walk ends.
-
-    The walk ends at a step that does not converge, and then the result is False. It also ends
-    after the step in which the robot tips over.
-    """
-    for _ in range(count):
-        if not step(model, body, feet, pressures):
-            return False
-        if body[TIPPED] > 0.0:
-            break
-    return True
-
-
 # --- gait -------------------------------------------------------------------------------------
 
 
@@ -129,7 +116,7 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
     """Move the feet in the body as the gait prescribes, between two times of the gait, s."""
     gait, trunk = model.gait, model.trunk
     cycle, duty, reach = gait.cycle, gait.duty, gait.reach
-    advance = body_advance(model, time) - body_advance(model, before)
+    advance = body_advance(gait, time) - body_advance(gait, before)
     turn = -gait.heading_gain * body[HEADING] * model.period
     phases, offset_x, offset_y = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y]
     lifted_x, lifted_y = feet[LIFTED_X], feet[LIFTED_Y]
@@ -160,14 +147,13 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
             offset_y[index] = lifted_y[index] * (1.0 - progress)
 
 
-def body_advance(model: PlanarModel, time: float) -> float:
-    """Return the intended advance of the body since time zero, m."""
-    gait = model.gait
+def body_advance(gait: Any, time: float) -> float:
+    """Return the intended advance of the body since time zero, m, of either kind of gait."""
     speed = gait.stride / gait.cycle
     if gait.pushes:
         angle = 4.0 * pi * time / gait.cycle
         return speed * (time - gait.cycle / (4.0 * pi) * sin(angle))
-    if time <= 0.0:
+    if time <= 0.0:  # feet are placed as if the gait had run before
         return speed * time
     if time >= gait.cycle:
         return speed * (time - 0.5 * gait.cycle)
@@ -432,12 +418,10 @@ def newton(
     contacts: Sequence[Pushed],
     dt: float,
     start: Three,
-    creep: float,
 ) -> tuple[float, float, float, bool]:
     """Minimise the convex energy of a step by Newton's method, with a line search by halving.
 
-    If ``creep`` is zero, contacts shear elastically up to their caps. If it is above zero, they
-    creep at about this speed, m/s (pseudo-Huber).
+    Contacts shear elastically up to their caps.
 
     Returns
     -------
@@ -454,7 +438,7 @@ def newton(
     length = 1.0
     for _ in range(200):
         gx, gy, gw, hxx, hxy, hyy, hxw, hyw, hww = derivatives(
-            (vx, vy, w), free, mass, inertia, contacts, dt, creep
+            (vx, vy, w), free, mass, inertia, contacts, dt
         )
         # The slope of a convex function grows along the step. If it rises at the end nearly as
         # steeply as it fell at the start, the step was too long and is halved.
@@ -492,7 +476,6 @@ def derivatives(
     inertia: float,
     contacts: Sequence[Pushed],
     dt: float,
-    creep: float,
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Return gradient x, y, w and Hessian xx, xy, yy, xw, yw, ww of the energy of a step."""
     vx, vy, w = velocity
@@ -508,13 +491,8 @@ def derivatives(
         square = zx * zx + zy * zy + zt * zt
         # gain: impulse over slip velocity; bend: fall of the gain along the slip, over the square
         # of the slip velocity
-        bend = 0.0
-        if creep > 0.0:
-            square += creep * creep
-            gain = dt * cap / sqrt(square)
-            bend = gain / square
-        elif rate * rate * square <= cap * cap:
-            gain = dt * rate
+        if rate * rate * square <= cap * cap:
+            gain, bend = dt * rate, 0.0
         else:
             gain = dt * cap / sqrt(square)
             bend = gain / square
@@ -522,11 +500,8 @@ def derivatives(
         gx += fx
         gy += fy
         gw += rx * fy - ry * fx
-        if radius > 0.0:
-            gw += radius * gain * zt
-            kxt, kyt, ktt = -bend * zx * zt, -bend * zy * zt, gain - bend * zt * zt
-        else:
-            kxt = kyt = ktt = 0.0
+        gw += radius * gain * zt
+        kxt, kyt, ktt = -bend * zx * zt, -bend * zy * zt, gain - bend * zt * zt
         kxx, kxy, kyy = gain - bend * zx * zx, -bend * zx * zy, gain - bend * zy * zy
         kxw = rx * kxy - ry * kxx + radius * kxt
         kyw = rx * kyy - ry * kxy + radius * kyt
@@ -581,10 +556,3 @@ def report(model: PlanarModel, body: Any, feet: Any, contacts: list[Pushed]) -> 
         home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
         feet[MARKER_X][index] = body[X] + cosine * home_x - sine * home_y
         feet[MARKER_Y][index] = body[Y] + sine * home_x + cosine * home_y
-
-
-# Functions that `walk` calls; the compiler needs a list of them.
-PARTS = (
-    step, move_feet, body_advance, load_share, touch_down, is_wet, share_loads, balance, grip,
-    dome_load, drain, resistance, on_film, newton, derivatives, push, report,
-)  # fmt: skip

@@ -7,7 +7,6 @@ than NumPy for single values.
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -39,7 +38,6 @@ then below 1 % of that step at every time."""
 
 _SETTLED = 0.1  # Pa from the target at which a pad has settled: 1/100 of the sensor's resolution
 _INSTANT = 1e-9  # s: shorter times are rounding errors of the caller's clock
-_CELLS = 100  # number of cells of the table of the pad's volume, from zero to full scale
 
 
 @dataclass(frozen=True)
@@ -186,13 +184,10 @@ class Hose:
             number('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
 
     @cached_property
-    def _law(self) -> tuple[float, float, float]:
-        """What every step needs, last the laminar flow over the difference of p², kg/(s Pa²)."""
-        slope, rt = math.inf, REFERENCE_PRESSURE / REFERENCE_DENSITY
-        if self.length:
-            drag = 256.0 * AIR_VISCOSITY * self.length * rt
-            slope = math.pi * self.inner_diameter**4 / drag
-        return self.sonic_conductance, self.critical_ratio, slope
+    def _laminar(self) -> float:
+        """Laminar flow over the difference of p², kg/(s Pa²)."""
+        drag = 256.0 * AIR_VISCOSITY * self.length * (REFERENCE_PRESSURE / REFERENCE_DENSITY)
+        return math.pi * self.inner_diameter**4 / drag if drag else math.inf
 
     @property
     def volume(self) -> float:
@@ -204,7 +199,7 @@ class Hose:
         """Part of the bore behind the resistance, m³."""
         return self.volume if self.measured_conductance is not None else 0.5 * self.volume
 
-    @property
+    @cached_property
     def sonic_conductance(self) -> float:
         """Sonic conductance C, m³/(s Pa)."""
         if self.measured_conductance is not None:
@@ -212,7 +207,7 @@ class Hose:
         d = self.inner_diameter
         return 0.029 * d * d / math.sqrt(self.length / d**1.25 + 510.0)
 
-    @property
+    @cached_property
     def critical_ratio(self) -> float:
         """b, the ratio of absolute pressures, downstream over upstream, where choking begins."""
         return 474.0 * self.sonic_conductance / self.inner_diameter**2
@@ -230,95 +225,15 @@ class Hose:
         float
             Conductance, kg/(s Pa), finite and positive also where the pressures are equal.
         """
-        sonic, ratio, slope = self._law
-        turbulent = conductance(sonic, ratio, first, second)
-        laminar = slope * (first + second)
+        turbulent = conductance(self.sonic_conductance, self.critical_ratio, first, second)
+        laminar = self._laminar * (first + second)
         return laminar if laminar < turbulent else turbulent
 
 
-class Outlet:
-    """A regulator with what it makes of its set-points, and the pressure at its outlet.
-
-    Parameters
-    ----------
-    model : RegulatorModel
-        The regulator.
-
-    Attributes
-    ----------
-    pressure : float
-        Pressure at the outlet, gauge Pa.
-    setpoint : float
-        The last set-point commanded, gauge Pa.
-    target : float
-        The set-point that is followed, after dead band and dead time, gauge Pa.
-    pending : tuple of (float, float)
-        Targets in dead time: when they are due, s, and gauge Pa.
-    """
-
-    def __init__(self, model: RegulatorModel) -> None:
-        self.model = model
-        self.pressure = self.setpoint = self.target = 0.0
-        self.pending: tuple[tuple[float, float], ...] = ()
-        self._rate = 0.0
-        self._accepted = 0.0  # the set-point that the dead band compares with
-        self._transition = (0.0, model.transition(0.0))
-
-    def command(self, setpoint: float, time: float) -> bool:
-        """Round a new set-point and, outside the dead band, queue it for the dead time.
-
-        Return whether it is outside.
-        """
-        model = self.model
-        number('setpoint', setpoint, 'Pa', 0.0, model.full_scale)
-        self.setpoint = setpoint
-        target = model.quantum * round(setpoint / model.quantum) if model.quantum else setpoint
-        target = min(target, model.full_scale)  # full scale need not be a multiple of the quantum
-        moved = abs(target - self._accepted)
-        follows = moved > model.dead_band * model.full_scale or (target == 0.0 and moved > 0.0)
-        if follows:
-            self._accepted = target
-            self.pending = (*self.pending, (time + model.dead_time, target))
-        return follows
-
-    def move(self, h: float, hardware: Condition) -> None:
-        """Move by the exact response of the regulator over a time h, s, within its limits."""
-        model = self.model
-        if h != self._transition[0]:
-            self._transition = h, model.transition(h)
-        ff, fr, rf, rr = self._transition[1]
-        if hardware.stuck:
-            outlet, self._rate = self.pressure, 0.0
-        else:
-            # The regulator controls the reading of its sensor, except with an open exhaust.
-            aim = self.target - hardware.offset if self.target else 0.0
-            error = self.pressure - aim
-            outlet = aim + ff * error + fr * self._rate
-            self._rate = rf * error + rr * self._rate
-        highest = min(model.full_scale, hardware.supply)
-        if not 0.0 <= outlet <= highest:
-            # Neither the exhaust nor the supply can move the outlet pressure further.
-            outlet = 0.0 if outlet < 0.0 else highest
-            self._rate = 0.0
-        self.pressure = outlet
-
-    def settle(self) -> bool:
-        """End the motion where the outlet is at the target and nothing is pending.
-
-        Return whether it has ended.
-        """
-        settled = (
-            abs(self.pressure - self.target) < _SETTLED
-            and abs(self._rate) < _SETTLED * self.model.natural_frequency
-            and not self.pending
-        )
-        if settled:
-            self.pressure, self._rate = self.target, 0.0
-        return settled
-
-
-class PadAir:
-    """Air in a pad, its chamber and the hose, over the pressure in the pad.
+def pad_stiffness(
+    pad_volume: float | Callable[[float], float], hose: Hose, full_scale: float
+) -> tuple[float, list[float]]:
+    """Return the rise of the pressure with the mass of air behind the hose's resistance, Pa/kg.
 
     Parameters
     ----------
@@ -329,52 +244,27 @@ class PadAir:
     full_scale : float
         Highest pressure, gauge Pa.
 
-    Attributes
-    ----------
-    before : float
-        Volume of the hose before its resistance, m³.
+    Returns
+    -------
+    tuple
+        Width of a cell of pressure, Pa, and the stiffness in cells from 0 to beyond full scale.
     """
-
-    def __init__(
-        self,
-        pad_volume: float | Callable[[float], float],
-        hose: Hose,
-        full_scale: float,
-    ) -> None:
-        count = _CELLS if callable(pad_volume) else 1
-        self._cell = full_scale / count
-        pressures = [i * self._cell for i in range(count + 1)]
-        volumes = [pad_volume(p) if callable(pad_volume) else pad_volume for p in pressures]
-        for pressure, volume in zip(pressures, volumes, strict=True):
-            number(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
-        self.before = hose.volume - hose.volume_behind
-        # Content p V in Pa m³, and its slope, the capacity, in m³.
-        contents = [
-            (p + ATMOSPHERE) * (float(v) + hose.volume_behind)
-            for p, v in zip(pressures, volumes, strict=True)
-        ]
-        capacities = [(high - low) / self._cell for low, high in pairwise(contents)]
-        if min(capacities) <= 0.0:
-            raise InvalidInput(
-                'pad_volume falls too fast with the pressure: pressure (absolute) times volume'
-                ' must grow with the pressure'
-            )
-        cells = [
-            (content, capacity, REFERENCE_PRESSURE / (REFERENCE_DENSITY * capacity), pressure)
-            for content, capacity, pressure in zip(
-                contents[:-1], capacities, pressures[:-1], strict=True
-            )
-        ]
-        self._cells = [*cells, cells[-1]]  # the last one is also that of full scale
-
-    def stiffness(self, pressure: float) -> float:
-        """Return the rise of the pressure with the mass of air, Pa/kg, at a gauge pressure, Pa."""
-        return self._cells[int(pressure / self._cell)][2]
-
-    def content(self, pressure: float) -> float:
-        """Return pressure times volume behind the resistance, Pa m³, at a gauge pressure, Pa."""
-        content, capacity, _, start = self._cells[int(pressure / self._cell)]
-        return content + capacity * (pressure - start)
+    count = 100 if callable(pad_volume) else 1
+    cell = full_scale / count
+    contents = []  # pressure times volume, Pa m³
+    for place in range(count + 1):
+        pressure = place * cell
+        volume = pad_volume(pressure) if callable(pad_volume) else pad_volume
+        number(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
+        contents.append((pressure + ATMOSPHERE) * (float(volume) + hose.volume_behind))
+    capacities = [(high - low) / cell for low, high in pairwise(contents)]
+    if min(capacities) <= 0.0:
+        raise InvalidInput(
+            'pad_volume falls too fast with the pressure: pressure (absolute) times volume'
+            ' must grow with the pressure'
+        )
+    stiffness = [REFERENCE_PRESSURE / (REFERENCE_DENSITY * each) for each in capacities]
+    return cell, [*stiffness, stiffness[-1]]
 
 
 class PneumaticChannel:
@@ -396,6 +286,12 @@ class PneumaticChannel:
     ----------
     pad_pressure : float
         Pressure in the pad, gauge Pa, in [0, full scale], also with faults.
+    outlet : float
+        Pressure at the outlet of the regulator, gauge Pa.
+    setpoint : float
+        The last set-point commanded, gauge Pa.
+    time : float
+        Time on the schedule of the faults, s.
     settled : bool
         Whether the pressures are constant, so that further steps with the same set-point return at
         once; False while a fault acts on the air.
@@ -442,57 +338,35 @@ class PneumaticChannel:
     ) -> None:
         instance('regulator', regulator, RegulatorModel)
         instance('hose', hose, Hose)
-        self.hose = hose
-        self.pad_pressure = 0.0
+        self.regulator, self.hose = regulator, hose
+        self.pad_pressure = self.outlet = self.setpoint = self.time = 0.0
         self.settled = not faults  # a fault may act from the beginning
         self._faults = tuple(faults)
-        self._edges = sorted({each.start for each in faults} | {each.end for each in faults})
-        self._time = 0.0
-        self._origin = 0.0  # time on the schedule of faults at which this channel started, s
-        self.outlet = Outlet(regulator)
-        self._air = PadAir(pad_volume, hose, regulator.full_scale)
-        self._content = self._air.content(0.0) + self._air.before * ATMOSPHERE
-        self._drawn = 0.0
+        self._stiffness = pad_stiffness(pad_volume, hose, regulator.full_scale)
+        self._rate = 0.0  # of the outlet, Pa/s
+        self._accepted = 0.0  # the set-point that the dead band compares with
+        self._target = 0.0  # the set-point that is followed, after dead band and dead time
+        self._pending: tuple[tuple[float, float], ...] = ()  # targets: when they are due, and Pa
+        self._transition = (0.0, regulator.transition(0.0))
 
-    def __copy__(self) -> PneumaticChannel:
-        """Return a channel in the same state, which moves on its own."""
-        twin = object.__new__(PneumaticChannel)
-        twin.__dict__.update(self.__dict__)
-        twin.outlet = copy.copy(self.outlet)
-        return twin
+    def start(self, time: float) -> None:
+        """Go on at another time, in the same state.
 
-    @property
-    def regulator(self) -> RegulatorModel:
-        """The regulator."""
-        return self.outlet.model
-
-    @property
-    def setpoint(self) -> float:
-        """The last set-point commanded, gauge Pa."""
-        return self.outlet.setpoint
-
-    @property
-    def air_used(self) -> float:
-        """Air drawn from the regulator since the start, kg; exhausted air is not subtracted."""
-        return self._drawn * REFERENCE_DENSITY / REFERENCE_PRESSURE
-
-    @property
-    def time(self) -> float:
-        """Time on the schedule of the faults, s; it can be set to another time."""
-        return self._origin + self._time
-
-    @time.setter
-    def time(self, time: float) -> None:
-        self._origin = time - self._time
+        Parameters
+        ----------
+        time : float
+            Time on the schedule of the faults, s.
+        """
+        shift, self.time = time - self.time, time
+        self._pending = tuple((due + shift, target) for due, target in self._pending)
         self.settled = self.settled and not self._faults
 
     @property
     def quiet_time(self) -> float:
         """Time until the next fault starts or ends, s; infinite if none does."""
-        if not self._edges:
-            return math.inf
-        time = self.time + _INSTANT
-        return min((edge for edge in self._edges if edge > time), default=math.inf) - self.time
+        edges = (edge for each in self._faults for edge in (each.start, each.end))
+        later = (edge for edge in edges if edge > self.time + _INSTANT)
+        return min(later, default=math.inf) - self.time
 
     def step(self, setpoint: float, dt: float) -> float:
         """Hold a set-point for a time and return the pad's pressure at its end.
@@ -516,46 +390,80 @@ class PneumaticChannel:
         """
         if not 0.0 <= dt < math.inf:
             raise InvalidInput(f'dt = {dt!r} s is not allowed: it must be finite and not negative')
-        outlet = self.outlet
-        if setpoint != outlet.setpoint and outlet.command(setpoint, self._time):
-            self.settled = False
-        if self.settled and not self._edges:
-            self._time += dt if dt > _INSTANT else 0.0
-            return self.pad_pressure
+        if setpoint != self.setpoint:
+            self._command(setpoint)
         while dt > _INSTANT:
-            sound = self.quiet_time if self._edges else math.inf
+            quiet = self.quiet_time if self._faults else math.inf
             if self.settled:
-                h = min(dt, sound)
-                self._time += h
+                h = min(dt, quiet)
+                self.time += h
                 dt -= h
-                self.settled = sound - h > _INSTANT
+                self.settled = quiet - h > _INSTANT
                 continue
             h = dt if dt <= MAX_STEP else dt / math.ceil(dt / MAX_STEP)
-            h = min(h, sound)
-            if outlet.pending:
-                due, target = outlet.pending[0]
-                if due - self._time <= _INSTANT:
-                    outlet.target, outlet.pending = target, outlet.pending[1:]
+            h = min(h, quiet)
+            if self._pending:
+                due, target = self._pending[0]
+                if due - self.time <= _INSTANT:
+                    self._target, self._pending = target, self._pending[1:]
                     continue
-                h = min(h, due - self._time)
+                h = min(h, due - self.time)
             self._advance(h)
             dt -= h
         return self.pad_pressure
 
+    def _command(self, setpoint: float) -> None:
+        """Round a new set-point and, outside the dead band, queue it for the dead time."""
+        model = self.regulator
+        self.setpoint = number('setpoint', setpoint, 'Pa', 0.0, model.full_scale)
+        target = model.quantum * round(setpoint / model.quantum) if model.quantum else setpoint
+        target = min(target, model.full_scale)  # full scale need not be a multiple of the quantum
+        moved = abs(target - self._accepted)
+        if moved > model.dead_band * model.full_scale or (target == 0.0 and moved > 0.0):
+            self._accepted = target
+            self._pending = (*self._pending, (self.time + model.dead_time, target))
+            self.settled = False
+
     def _advance(self, h: float) -> None:
         """Move regulator and pad by a time h, s."""
-        outlet, now = self.outlet, self.time
+        start, now = self.outlet, self.time
         # Steps end where a fault starts or ends: one at mid-step acts during the whole step.
         hardware = self._hardware(now + 0.5 * h, now + h)
-        start = outlet.pressure
-        outlet.move(h, hardware)
+        self._move_outlet(h, hardware)
         self._move_pad(h, start, hardware.leak)
-        self._time += h
-        near = abs(self.pad_pressure - outlet.target) < _SETTLED
+        self.time += h
         soon = self.time + 2.0 * _INSTANT  # within the rounding of the clock
-        if near and self._hardware(soon, soon).sound and outlet.settle():
-            self._fill(outlet.target)
-            self.settled = True
+        self.settled = (
+            abs(self.pad_pressure - self._target) < _SETTLED
+            and abs(self.outlet - self._target) < _SETTLED
+            and abs(self._rate) < _SETTLED * self.regulator.natural_frequency
+            and not self._pending
+            and self._hardware(soon, soon).sound
+        )
+        if self.settled:
+            self.pad_pressure = self.outlet = self._target
+            self._rate = 0.0
+
+    def _move_outlet(self, h: float, hardware: Condition) -> None:
+        """Move the outlet by the regulator's exact response over a time h, s, in its limits."""
+        if h != self._transition[0]:
+            self._transition = h, self.regulator.transition(h)
+        ff, fr, rf, rr = self._transition[1]
+        outlet = self.outlet
+        if hardware.stuck:
+            self._rate = 0.0
+        else:
+            # The regulator controls the reading of its sensor, except with an open exhaust.
+            aim = self._target - hardware.offset if self._target else 0.0
+            error = outlet - aim
+            outlet = aim + ff * error + fr * self._rate
+            self._rate = rf * error + rr * self._rate
+        highest = min(self.regulator.full_scale, hardware.supply)
+        if not 0.0 <= outlet <= highest:
+            # Neither the exhaust nor the supply can move the outlet pressure further.
+            outlet = 0.0 if outlet < 0.0 else highest
+            self._rate = 0.0
+        self.outlet = outlet
 
     def _move_pad(self, h: float, start: float, leak: float) -> None:
         """Move the pad by a time h, s, in which the outlet moved linearly from ``start``, Pa.
@@ -564,21 +472,17 @@ class PneumaticChannel:
         Together they draw it to a share of the outlet's pressure. gap = pad - share outlet obeys
         gap' = -relaxation gap - ramp.
         """
-        outlet, before = self.outlet.pressure, self.pad_pressure
+        outlet, before = self.outlet, self.pad_pressure
         middle = 0.5 * (start + outlet)
-        drawn, at, pad = start, before, before
+        drawn, pad = start, before
         for time, target in ((0.5 * h, middle), (h, outlet)):
-            at = pad
-            relaxation, share = self._relaxation(drawn, at, leak)
+            relaxation, share = self._relaxation(drawn, pad, leak)
             gap = before - share * start
             ramp = share * (outlet - start) / h
             done = -math.expm1(-relaxation * time)
             pad = share * target + gap - (gap + ramp / relaxation) * done
             drawn = middle
-        lost = 0.0
-        if leak:
-            lost = self._leaking(at, leak) * at * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
-        self._fill(pad, lost)
+        self.pad_pressure = pad
 
     def _hardware(self, during: float, time: float) -> Condition:
         """Return the condition at a time, s, by the faults that act at the time ``during``, s."""
@@ -592,25 +496,13 @@ class PneumaticChannel:
 
         Return this share, too.
         """
-        air = self._air
+        cell, values = self._stiffness
+        stiffness = values[int(pad / cell)]
         inflow = self.hose.conductance(outlet + ATMOSPHERE, pad + ATMOSPHERE)
         if not leak:
-            return inflow * air.stiffness(pad), 1.0
-        total = inflow + self._leaking(pad, leak)
-        return total * air.stiffness(pad), inflow / total
-
-    def _leaking(self, pad: float, leak: float) -> float:
-        """Return the conductance of a leak at the pad, kg/(s Pa)."""
-        return conductance(leak, LEAK_CRITICAL_RATIO, pad + ATMOSPHERE, ATMOSPHERE)
-
-    def _fill(self, pressure: float, lost: float = 0.0) -> None:
-        """Set the pad's pressure, Pa, and add the air drawn; ``lost`` is the air leaked, Pa m³."""
-        content = self._air.content(pressure)
-        content += self._air.before * (self.outlet.pressure + ATMOSPHERE)
-        if content + lost > self._content:
-            self._drawn += content + lost - self._content
-        self._content = content
-        self.pad_pressure = pressure
+            return inflow * stiffness, 1.0
+        total = inflow + conductance(leak, LEAK_CRITICAL_RATIO, pad + ATMOSPHERE, ATMOSPHERE)
+        return total * stiffness, inflow / total
 
 
 def time_to(

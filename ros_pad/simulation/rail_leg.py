@@ -12,12 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from ros_pad.configuration import instance, number
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
-from ros_pad.simulation.robot import FootState, Vector, check_pressures, contacts_of
-from ros_pad.simulation.scene import RailBody, RailGait, Scene
+from ros_pad.simulation.robot import FootState, Vector, check_pressures
+from ros_pad.simulation.scene import RailBody, Scene
 from ros_pad.simulation.terrain import Floor
 
 
@@ -51,9 +53,8 @@ class RailLeg:
 
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
         instance('scene', scene, Scene)
-        instance('scene.body', scene.body, RailBody)
         instance('floor', floor, Floor)
-        assert isinstance(scene.body, RailBody) and isinstance(scene.gait, RailGait)
+        self._body, self._gait = scene.on_rail
         number('period', period, 's', above=True)
         self.period = period
         self.time = 0.0
@@ -64,7 +65,7 @@ class RailLeg:
         self._foot = scene.foot.on_rough(scene.floor.roughness)
         self._film = Film(self._foot, scene.floor.viscosity)
         self._x = self.speed = 0.0
-        self._offset = scene.gait.stroke / 2.0
+        self._offset = self._gait.stroke / 2.0
         self.feet[0].standing = True
         self._film.touch_down(floor.depth(self._offset, 0.0))
 
@@ -86,8 +87,7 @@ class RailLeg:
         tuple
             Whether the foot stands, its distance ahead of the body, m, and its height, m.
         """
-        gait = self._scene.gait
-        assert isinstance(gait, RailGait)
+        gait = self._gait
         since = max(0.0, time - self._scene.settle) % gait.cycle
         if since < gait.stance:
             return True, 0.5 * gait.stroke * math.cos(math.pi * since / gait.stance), 0.0
@@ -98,7 +98,7 @@ class RailLeg:
     @property
     def contacts(self) -> Array:
         """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
-        return contacts_of(self.feet)
+        return np.array([(*foot.force, foot.moment, *foot.position) for foot in self.feet])
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period``.
@@ -114,9 +114,7 @@ class RailLeg:
             When the sequence is not one finite pressure.
         """
         check_pressures(pressures, 1)
-        dt, state, foot, scene = self.period, self.feet[0], self._foot, self._scene
-        body = scene.body
-        assert isinstance(body, RailBody)
+        dt, state, foot, body = self.period, self.feet[0], self._foot, self._body
         self.time = (round(self.time / dt) + 1) * dt
         stands, offset, height = self.plan(self.time)
         back = (self._offset - offset) / dt
@@ -134,7 +132,7 @@ class RailLeg:
             if state.wet:
                 films = self._film.drain(domes, load - domes, pressure, dt)
             cap = foot.resistance_of(domes, load - domes, pressure, *films)
-        free = self.speed - GRAVITY * math.sin(scene.floor.slope) * dt
+        free = self.speed - GRAVITY * math.sin(self._scene.floor.slope) * dt
         self.speed, force = push(free, back, cap, body, dt)
         self._x += self.speed * dt
         slip = self.speed - back if stands else 0.0

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -13,11 +13,7 @@ import numpy as np
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
-from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.scene import LeggedBody, Scene
-
-STEERED = 0.1
-"""Error of the heading that legs must be able to steer back from, rad."""
+from ros_pad.simulation.scene import Scene
 
 Vector = tuple[float, float, float]
 
@@ -27,21 +23,21 @@ class Proprioception(NamedTuple):
 
     Attributes
     ----------
-    gyro, accelerometer : tuple of float
+    gyro, accelerometer : array (3,)
         Angular velocity, rad/s, and specific force, m/s² (+9.81 upwards at rest), IMU axes.
-    positions, velocities, efforts : list of float
+    positions, velocities, efforts : array (joints,)
         Of the joints, in the order of ``joint_names``: rad, rad/s, and the torques of the motors
         behind their gears, N m.
-    forces : list of tuple of float
+    forces : array (feet, 3)
         Force of the ground on each foot, N, in the axes of the link that carries the foot.
     """
 
-    gyro: Vector
-    accelerometer: Vector
-    positions: list[float]
-    velocities: list[float]
-    efforts: list[float]
-    forces: list[Vector]
+    gyro: Array
+    accelerometer: Array
+    positions: Array
+    velocities: Array
+    efforts: Array
+    forces: Array
 
 
 @dataclass(slots=True)
@@ -80,11 +76,6 @@ class FootState:
     slip_speed: float = 0.0
     slip_path: float = 0.0
     overload_time: float = 0.0
-
-
-def contacts_of(feet: Sequence[FootState]) -> Array:
-    """Return :attr:`SimulatedRobot.contacts` of states of feet."""
-    return np.array([(*foot.force, foot.moment, *foot.position) for foot in feet])
 
 
 class SimulatedRobot(Protocol):
@@ -162,38 +153,35 @@ def check_reach(scene: Scene) -> FeetSolver:
         When a foot does not reach the places to which lift, stride and steering of the gait bring
         it, or a joint would be beyond the travel of its servo or its limits.
     """
-    assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
-    robot, gain = scene.body.robot, scene.heading_gain
-    lift, stride = scene.gait.lift, scene.gait.stride
-    motions: tuple[tuple[str, float, str, Callable[[float], str]], ...] = (
-        ('gait.lift', lift, 'm', lambda value: _miss(scene, value, 0.0, 0.0)),
-        ('gait.stride', stride, 'm', lambda value: _miss(scene, lift, value, 0.0)),
-        ('gait.heading_gain', gain, '1/s', lambda value: _miss(scene, lift, stride, value)),
-    )
-    for name, value, unit, miss in motions:
-        if why := miss(value):
+    body, gait = scene.legged
+    wanted = {'lift': gait.lift, 'stride': gait.stride, 'heading_gain': scene.heading_gain}
+    tried = dict.fromkeys(wanted, 0.0)
+    for name, value in wanted.items():
+        tried[name] = value
+        if why := _miss(scene, **tried):
             low, high = 0.0, value
             while high - low > 0.01 * value:
-                middle = 0.5 * (low + high)
-                low, high = (low, middle) if miss(middle) else (middle, high)
+                tried[name] = middle = 0.5 * (low + high)
+                low, high = (low, middle) if _miss(scene, **tried) else (middle, high)
+            unit = '1/s' if name == 'heading_gain' else 'm'
             raise ConfigError(
-                f'{scene.source}: {name} = {value:g} {unit} is not allowed: at most {low:.3g}'
-                f' {unit} is within reach of the legs of {robot.source} from its home: {why}'
+                f'{scene.source}: gait.{name} = {value:g} {unit} is not allowed: at most {low:.3g}'
+                f' {unit} is within reach of the legs of {body.robot.source} from its home: {why}'
             )
-    return FeetSolver(robot)
+    return FeetSolver(body.robot)
 
 
-def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:
+def _miss(scene: Scene, lift: float, stride: float, heading_gain: float) -> str:
     """Return why the feet cannot follow the gait with these values, or an empty text."""
-    body, gait = scene.body, scene.gait
-    assert isinstance(body, LeggedBody) and isinstance(gait, WalkingGait)
+    body, gait = scene.legged
     robot, solver = body.robot, FeetSolver(body.robot)
     home, travel = robot.home.ravel(), robot.servo.travel if robot.servo else math.inf
     limits = np.array([joint.limits for leg in robot.chains.legs for joint in leg])
     lows = np.maximum(limits[:, 0], home - travel)
     highs = np.minimum(limits[:, 1], home + travel)
     reach = gait.reach() * stride / gait.stride
-    turn = STEERED * gain * gait.duty * gait.cycle  # of a whole stance, rad
+    # Legs must be able to steer back from a heading of 0.1 rad; this is the turn of a stance, rad.
+    turn = 0.1 * heading_gain * gait.duty * gait.cycle
     for step in range(8, -9, -1):
         ahead, turned = reach * step / 8.0, turn * (8 - step) / 16.0
         up = lift * (1.0 - (step / 8.0) ** 2)

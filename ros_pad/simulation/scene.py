@@ -26,8 +26,6 @@ from ros_pad.simulation.terrain import FLOORS, Floor, patch_lengths
 LEAST_TRUNK = 0.01
 """Least share of a robot's mass that is not legs."""
 
-METRICS = ('distance', 'slip')
-
 RAIL_LEG = 'rail_leg'
 """The robot of a scene with the leg on its rail."""
 
@@ -372,6 +370,32 @@ class Scene:
     faults: tuple[Fault, ...] = ()
 
     @property
+    def legged(self) -> tuple[LeggedBody, WalkingGait]:
+        """Body and gait of a robot with legs.
+
+        Raises
+        ------
+        InvalidInput
+            For the leg on its rail.
+        """
+        if isinstance(self.body, LeggedBody) and isinstance(self.gait, WalkingGait):
+            return self.body, self.gait
+        raise InvalidInput(f'scene {self.name!r} is not allowed: a robot with legs is needed')
+
+    @property
+    def on_rail(self) -> tuple[RailBody, RailGait]:
+        """Body and gait of the leg on its rail.
+
+        Raises
+        ------
+        InvalidInput
+            For other robots.
+        """
+        if isinstance(self.body, RailBody) and isinstance(self.gait, RailGait):
+            return self.body, self.gait
+        raise InvalidInput(f'scene {self.name!r} is not allowed: a rail leg is needed')
+
+    @property
     def duration(self) -> float:
         """Simulated time of a trial, s."""
         return self.settle + self.cycles * self.gait.cycle
@@ -388,8 +412,7 @@ class Scene:
         """Normal force of a foot when the fewest feet stand, N; that of the spring on a rail."""
         if isinstance(self.gait, WalkingGait):
             return self.body.mass * GRAVITY / self.gait.fewest
-        assert isinstance(self.body, RailBody)
-        return self.body.load
+        return self.on_rail[0].load
 
     @property
     def regulator_options(self) -> dict[str, Any]:
@@ -498,7 +521,7 @@ class Scene:
             settle=table.number('settle', 's', 0.0, 60.0, default=1.0),
             cycles=table.integer('cycles', 1, 100000),
             accuracy=table.number('accuracy', '(relative)', 1e-4, 1.0),
-            metric=table.choice('metric', METRICS, default='distance'),
+            metric=table.choice('metric', ('distance', 'slip'), default='distance'),
             wanted=table.choice('wanted', ('walk', 'metric'), default='walk'),
             faults=listed(table),
         )

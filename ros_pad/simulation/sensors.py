@@ -12,7 +12,7 @@ import numpy as np
 from ros_pad.records import SAMPLE, Array
 from ros_pad.simulation.faults import BODY_KINDS, FOOT_KINDS, Fault, faults_of
 from ros_pad.simulation.robot import Proprioception, SimulatedRobot
-from ros_pad.simulation.scene import Scene, SensorNoise
+from ros_pad.simulation.scene import Scene
 
 _BLOCK = 1000  # samples drawn at once, because a call of NumPy costs more than the numbers
 
@@ -22,36 +22,20 @@ class Sensors:
 
     Parameters
     ----------
-    noise : SensorNoise
-        Standard deviations of the readings.
-    legs : int
-        Number of feet.
+    scene : Scene
+        Scene with legs, noise and faults.
     seed : int
         Whole number from 0; the same seed gives the same noise.
-    faults : sequence of sequences of Fault
-        Faults of the sensors of each foot; none by default.
     """
 
-    def __init__(
-        self,
-        noise: SensorNoise,
-        legs: int,
-        seed: int,
-        faults: Sequence[Sequence[Fault]] = (),
-    ) -> None:
-        self._noise = noise
-        self._faults = [(index, of_foot) for index, of_foot in enumerate(faults) if of_foot]
+    def __init__(self, scene: Scene, seed: int) -> None:
+        self._noise = scene.sensors
+        self._faults = _of_feet(scene)
         self._generators = [np.random.default_rng([seed, stream]) for stream in (2, 3)]
-        self._block = SAMPLE.rows(0, legs)  # noise, to which samples are added
+        self._block = SAMPLE.rows(0, len(scene.legs))  # noise, to which samples are added
         self._contacts = _numbers(self._block)
         self._next = 0
         self._last: Array | None = None
-
-    @classmethod
-    def of(cls, scene: Scene, seed: int) -> Sensors:
-        """Return the sensors of a scene's robot."""
-        faults = [faults_of(leg, scene.faults, FOOT_KINDS) for leg in scene.legs]
-        return cls(scene.sensors, len(scene.legs), seed, faults)
 
     def sample(self, robot: SimulatedRobot) -> np.ndarray:
         """Return the next sample: rows of ``SAMPLE``, (feet,), with noise and faults.
@@ -64,9 +48,7 @@ class Sensors:
         np.add(contacts, robot.contacts, contacts)
         self._next += 1
         if self._faults:
-            before = contacts if self._last is None else self._last
-            for index, faults in self._faults:
-                _fail(contacts[index], before[index], faults, robot.time)
+            _fail(contacts, self._last, self._faults, robot.time)
             self._last = contacts
         return rows
 
@@ -91,9 +73,21 @@ def _numbers(rows: np.ndarray) -> Array:
     return rows[..., None].view('f8')[..., :7]
 
 
-def _fail(row: Array, before: Array, faults: Sequence[Fault], time: float) -> None:
-    """Change a row of force, moment and position as faults do; ``before`` is the row before."""
-    for fault in faults:
+def _of_feet(scene: Scene) -> list[tuple[int, Fault]]:
+    """Return the faults of the sensors of feet, each with the index of its foot."""
+    return [
+        (index, fault)
+        for index, leg in enumerate(scene.legs)
+        for fault in faults_of(leg, scene.faults, FOOT_KINDS)
+    ]
+
+
+def _fail(
+    contacts: Array, last: Array | None, faults: Sequence[tuple[int, Fault]], time: float
+) -> None:
+    """Change force, moment and position of feet as faults do; ``last`` are those before."""
+    for index, fault in faults:
+        row, before = contacts[index], (contacts if last is None else last)[index]
         if not fault.acts_at(time):
             continue
         if fault.kind == 'force_dead':
@@ -147,34 +141,27 @@ class BodySensors:
         self._imu, self._joints, self._forces = (
             np.random.default_rng([seed, stream]) for stream in (4, 5, 6)
         )
-        self._biases = np.concatenate(
-            [
-                _of_length(noise.gyro_bias, self._imu),
-                _of_length(noise.accelerometer_bias, self._imu),
-            ]
-        )
+        biases = (noise.gyro_bias, noise.accelerometer_bias)
+        self._biases = np.concatenate([_of_length(each, self._imu) for each in biases])
         self._imu_scale = np.repeat((noise.gyro, noise.accelerometer), 3)
         self._joint_scale = np.repeat(
             (noise.encoder, noise.joint_velocity, noise.effort), joints
         ).reshape(3, joints)
         self._faults = [fault for fault in scene.faults if fault.kind in BODY_KINDS]
-        self._of_feet = [faults_of(leg, scene.faults, FOOT_KINDS) for leg in scene.legs]
+        self._of_feet = _of_feet(scene)
         self._last: Array | None = None
 
     def read(self, truth: Proprioception, time: float) -> BodyReading:
         """Return the next reading of the true values at a time, s."""
-        values = np.array((*truth.gyro, *truth.accelerometer)) + self._biases
+        values = np.concatenate(truth[:2]) + self._biases
         values += self._imu_scale * self._imu.standard_normal(6)
-        joints = np.array((truth.positions, truth.velocities, truth.efforts))
+        joints = np.array(truth[2:5])
         joints += self._joint_scale * self._joints.standard_normal(joints.shape)
         rows = SAMPLE.rows(len(truth.forces))
-        felt = np.array(truth.forces)
-        felt += self._noise.force * self._forces.standard_normal(felt.shape)
-        rows['force'] = felt
+        rows['force'] = truth.forces
+        rows['force'] += self._noise.force * self._forces.standard_normal(rows['force'].shape)
         contacts = _numbers(rows)
-        before = contacts if self._last is None else self._last
-        for index, faults in enumerate(self._of_feet):
-            _fail(contacts[index], before[index], faults, time)
+        _fail(contacts, self._last, self._of_feet, time)
         self._last = contacts
         for fault in self._faults:
             if fault.acts_at(time):

@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import sub
 
 import numpy as np
 
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
-from ros_pad.simulation.gait import FootPath, WalkingGait
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.gait import FootPath
+from ros_pad.simulation.scene import Scene
 
 LOST = 0.3
 """Angle between a joint and its set-point, rad, at which the walk ends with a verdict."""
@@ -41,8 +40,7 @@ class Servos:
     """
 
     def __init__(self, scene: Scene, solver: FeetSolver, period: float, setpoints: Array) -> None:
-        body = scene.body
-        assert isinstance(body, LeggedBody) and isinstance(scene.gait, WalkingGait)
+        body, gait = scene.legged
         assert body.robot.servo is not None
         self._robot, self._servo = body.robot, body.robot.servo
         self._solver = solver
@@ -50,7 +48,7 @@ class Servos:
         self._settle = scene.settle
         self._gain = scene.heading_gain
         self._weight = body.mass * GRAVITY
-        self.path = FootPath(scene.gait, [(x, y, body.ground) for x, y in body.homes])
+        self.path = FootPath(gait, [(x, y, body.ground) for x, y in body.homes])
         self.targets = solver.angles([(x, y, body.ground) for x, y, _ in self.path.feet])
         self._setpoints = setpoints
         setpoints[:] = self.targets
@@ -85,9 +83,8 @@ class Servos:
 
     def lost(self, joints: Sequence[float]) -> str:
         """Return which of the joints, rad, is far from its set-point, or an empty text."""
-        worst = max(map(abs, map(sub, self.targets, joints)))
-        if worst <= LOST:
+        off = np.abs(np.subtract(self.targets, joints))
+        worst = int(off.argmax())
+        if off[worst] <= LOST:
             return ''
-        lost = [abs(a - b) == worst for a, b in zip(self.targets, joints, strict=True)]
-        name = self._robot.joint_names[lost.index(True)]
-        return f'servo {name} is {worst:.2f} rad off its set-point'
+        return f'servo {self._robot.joint_names[worst]} is {off[worst]:.2f} rad off its set-point'

@@ -20,7 +20,7 @@ from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.margin import Stand, grounds, mid_stance_grip
 from ros_pad.simulation.pneumatics import ATMOSPHERE
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 
 ADVANCING, RECEDING = 2.0944, 1.5708
 """Contact angles of water on the pads, rad, with which the force of contact lines is added."""
@@ -134,10 +134,9 @@ def _lines(scene: Scene) -> Term:
 
 def _by_friction(term: Term, scene: Scene, policy: str) -> float | None:
     """Return the effect of a term that changes the friction; None if unknown."""
-    promises = levels.Promises.load()
-    if term.bound is None or scene.floor.kind == 'dry' or promises.beyond(scene, policy):
+    if term.bound is None or scene.floor.kind == 'dry':
         return None
-    effect = promises.bound(levels.FRICTION, scene, policy)
+    effect = levels.Promises.load().bound(levels.FRICTION, scene, policy)
     return term.bound * (effect / _STEP) if effect < math.inf else None
 
 
@@ -238,7 +237,7 @@ def _air(scene: Scene) -> Term:
 
 
 def _joints(scene: Scene, policy: str) -> Term:
-    bound = levels.choose(scene, 'L1', policy).bound
+    bound = levels.Promises.load().bound('L1', scene, policy)
     known = bound if bound < math.inf else None
     reason = (
         f'of the {scene.metric}: L1 against the top level, on which feet slip by millimetres where'
@@ -254,9 +253,7 @@ def _sole(scene: Scene) -> Term:
     The centre of pressure of a sole moves by a radius R at most. On three feet moments balance
     about the line through two of them: the load of the third, at a height h, moves by W R/h.
     """
-    gait, body = scene.gait, scene.body
-    assert isinstance(gait, WalkingGait) and isinstance(body, LeggedBody)
-    found = 0.0
+    (body, gait), found = scene.legged, 0.0
     for middle in set(gait.middles):
         feet = [home for home, own in zip(body.homes, gait.middles, strict=True) if own == middle]
         if not gait.pushes or len(feet) != 3:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
@@ -52,8 +52,7 @@ def _field(smoothing: float, seed: int, stream: int) -> np.ndarray:
     noise = np.random.default_rng([seed, stream]).normal(size=shape)
     from scipy.ndimage import gaussian_filter  # here, because many floors have no patches
 
-    field: np.ndarray = gaussian_filter(noise, smoothing / CELL, mode='wrap')
-    return field
+    return np.asarray(gaussian_filter(noise, smoothing / CELL, mode='wrap'))
 
 
 @dataclass(frozen=True)
@@ -85,14 +84,10 @@ class Floor:
     origin: tuple[float, float]
     film_thickness: float
     heights: np.ndarray | None = None
-    _rows: list[bytes] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         number('cell', self.cell, 'm', above=True)
         number('film_thickness', self.film_thickness, 'm')
-        # Lists would be searched whole by every full run of the garbage collector.
-        rows = [row.tobytes() for row in np.asarray(self.wet_map, dtype=bool)]
-        object.__setattr__(self, '_rows', rows)
 
     @classmethod
     def uniform(cls, wet: bool, film_thickness: float) -> Floor:
@@ -255,9 +250,9 @@ class Floor:
         bool
             True on wet ground.
         """
-        rows = self._rows
-        row = rows[int((y - self.origin[1]) // self.cell) % len(rows)]
-        return row[int((x - self.origin[0]) // self.cell) % len(row)] != 0
+        rows, columns = self.wet_map.shape
+        row = int((y - self.origin[1]) // self.cell) % rows
+        return bool(self.wet_map[row, int((x - self.origin[0]) // self.cell) % columns])
 
     def depth(self, x: float, y: float) -> float:
         """Return the depth of the liquid at a position.

@@ -160,7 +160,7 @@ class ClosedLoop:
         self.period_ns = round(1e9 / scene.sensors.rate)
         self.floor = scene.floor.build(seed)
         self.robot = levels.build(with_terms(scene), self.floor, self.period_ns * 1e-9, level)
-        self.sensors = Sensors.of(scene, seed)
+        self.sensors = Sensors(scene, seed)
         self._stamp_ns = 0
         self.body: BodySensing | None = None
         if sensing == 'joints':

@@ -32,7 +32,6 @@ WATCHED = (
     'ros_pad.regulators.alicat',
     'ros_pad.regulators.serial_device',
     'ros_pad.regulators.serial_text',
-    'ros_pad.regulators.smc_itv',
     'ros_pad.simulation.faults',
     'ros_pad.configuration',
     'ros_pad.bags',
@@ -86,8 +85,8 @@ def _device(backend: str) -> Target:
 
     As from a real device, a reply is ASCII, stripped, and at most :data:`REPLY` bytes long.
     """
-    name, options, seeds = _DEVICES[backend]
-    kind = getattr(importlib.import_module(f'ros_pad.regulators.{backend}'), name)
+    options, seeds = _DEVICES[backend]
+    kind = importlib.import_module('ros_pad.regulators').BACKENDS[backend]
 
     def feed(data: bytes) -> None:
         regulator = kind(port='fuzz', **options)
@@ -160,9 +159,8 @@ def _bag(chunked: bool = True) -> bytes:
     return stream.getvalue()
 
 
-_DEVICES: dict[str, tuple[str, dict[str, Any], list[bytes]]] = {
+_DEVICES: dict[str, tuple[dict[str, Any], list[bytes]]] = {
     'alicat': (
-        'AlicatRegulator',
         {},
         [
             b'A +014.70 +000.00\nA 8v17.0-R23\n' + b'A +014.70 +000.00\n' * 4,
@@ -170,12 +168,10 @@ _DEVICES: dict[str, tuple[str, dict[str, Any], list[bytes]]] = {
         ],
     ),
     'smc_itv': (
-        'SmcItvRegulator',
         {'full_scale': 100e3},
         [b'0\n12\n0\n0\n12\n512\n512\n510\n921\n921\n920', b'UNKNOWN COMMAND\n'],
     ),
     'serial_text': (
-        'SerialTextRegulator',
         {},
         [b'1 1.0\nOK 1 0.000\n1 1.0\nOK 1 2.500\n1 3.0\nOK 1 4.500\n1 4.6\n'],
     ),

@@ -108,7 +108,7 @@ def elastic(
         )
         for c in holding
     ]  # fmt: skip
-    vx, vy, turn, settled = newton(free, mass, inertia, pushed, dt, start, 0.0)
+    vx, vy, turn, settled = newton(free, mass, inertia, pushed, dt, start)
     if not settled:
         raise ArithmeticError(f'friction step of {dt:g} s with {len(holding)} contacts diverges')
     for contact in contacts:

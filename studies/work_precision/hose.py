@@ -36,7 +36,7 @@ def filling_time(hose: Hose, volume: Volume, regulated: bool = True) -> float:
     model = RegulatorModel() if regulated else RegulatorModel(dead_time=0.0)
     channel = PneumaticChannel(model, hose, volume)
     if not regulated:
-        channel.outlet.pressure = GOAL
+        channel.outlet = GOAL
     return time_to(channel, GOAL, 0.9 * GOAL)
 
 

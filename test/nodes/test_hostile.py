@@ -161,7 +161,7 @@ class Rig:
             self.node.trigger_deactivate()
         self.node.trigger_cleanup()
         Device.made = ()
-        for name, value in (('command_timeout', 0.5), ('slew_limit', 0.0), ('on_fault', 'report')):
+        for name, value in (('command_timeout', 0.5), ('on_fault', 'report')):
             assert self.bench.set(name, value).successful
         self.node.trigger_configure()
         self.node.trigger_activate()
@@ -177,7 +177,7 @@ class Rig:
 
     def device(self, leg):
         channels = {each.leg: each for each in self.node.supervision.channels}
-        return channels[leg].outlet.regulator if channels else None
+        return channels[leg].regulator if channels else None
 
     def tick(self, step_ns):
         """Advance the clock; where records come, it matters 0.1 s after the last one."""
@@ -247,7 +247,7 @@ ACTIONS = st.one_of(
     action('tick', st.one_of(st.integers(-(10**9), 0), st.integers(-(2**62), 2**61))),
     action('vent'),
     action('transit', st.sampled_from(['configure', 'activate', 'deactivate', 'cleanup'])),
-    action('set', st.sampled_from(['command_timeout', 'slew_limit', 'ceiling']), numbers),
+    action('set', st.sampled_from(['command_timeout', 'ceiling']), numbers),
     action('set', st.just('on_fault'), st.sampled_from(['report', 'vent', 'x'])),
     action('cable', legs, st.booleans()),
 )

@@ -68,7 +68,7 @@ class Robot:
         return next(each for each in self.node.supervision.channels if each.leg == leg)
 
     def device(self, leg=1):
-        return self.channel(leg).outlet.regulator
+        return self.channel(leg).regulator
 
     def gauge(self, leg=1):
         """Return the pressure of a pad now, Pa gauge."""
@@ -282,7 +282,7 @@ def test_the_life_of_the_node(robot, context, executor):
     assert transit('DEACTIVATE') == State.PRIMARY_STATE_INACTIVE
     robot.bench.tick(1.0)
     assert robot.gauge() < 1e3
-    devices = [channel.outlet.regulator for channel in node.supervision.channels]
+    devices = [channel.regulator for channel in node.supervision.channels]
     assert transit('CLEANUP') == State.PRIMARY_STATE_UNCONFIGURED
     for device in devices:
         with pytest.raises(TransportError, match='not open'):
@@ -373,7 +373,7 @@ def test_a_port_can_be_corrected_and_tried_again(robot, devices, capfd):
     assert "node regulator: no such port: 'none'" in capfd.readouterr().err
     assert robot.bench.set('backend_options.port', 'usb').successful
     assert robot.transit('configure')
-    assert [channel.outlet.regulator.port for channel in node.supervision.channels] == [
+    assert [channel.regulator.port for channel in node.supervision.channels] == [
         'usb',
         'usb',
     ]

@@ -19,13 +19,13 @@ def test_pressure_follows_with_one_time_constant(monkeypatch):
     now = 100.0
     monkeypatch.setattr(time, 'monotonic', lambda: now)
     valve = Valve(time_constant=0.1)
-    valve.setpoint = 50e3
+    valve.follow(50e3)
     now += 0.1
     assert valve.pressure == pytest.approx(50e3 * 0.6321206)
-    valve.setpoint = 0.0
+    valve.follow(0.0)
     now += 0.1
     assert valve.pressure == pytest.approx(50e3 * 0.6321206 * 0.3678794)
-    valve.held = True
+    valve.follow(50e3, held=True)
     before = valve.pressure
     now += 1.0
     assert valve.pressure == before

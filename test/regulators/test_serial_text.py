@@ -7,6 +7,7 @@ from ros_pad.errors import ConfigError, ProtocolError
 from ros_pad.regulators import Regulator, create
 
 SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
+COUNT = 100e3 / 1023  # Pa, of an SMC ITV
 
 
 def test_commands_to_set_read_and_vent(dialogue, until):
@@ -69,7 +70,7 @@ def test_a_board_with_other_templates_counts_and_no_reply(dialogue, until):
 @pytest.mark.parametrize('reply', ['', '2 1.0', '1 1.0 V', '1 nan', '1 1e999'])
 def test_an_invalid_reading_is_refused_with_port_command_and_reply(reply):
     regulator = create('serial_text', port='/dev/somewhere')
-    with pytest.raises(ProtocolError, match='the reply does not match read_reply') as caught:
+    with pytest.raises(ProtocolError, match='the reply does not match') as caught:
         regulator.poll(lambda command: reply)
     assert f"port /dev/somewhere, command 'READ 1', reply {reply!r}" in str(caught.value)
 
@@ -109,16 +110,12 @@ def test_six_channels_share_a_port(emulated, opened, until):
     ('options', 'words'),
     [
         ({'set_template': 'SET {channel}'}, '1 {value} is needed'),
-        ({'set_template': 'SET {value:.3f} {value:.3f}'}, '1 {value} is needed'),
-        ({'set_reply': '{value} {value}'}, '0 or 1 {value} is needed'),
         ({'read_template': 'READ {value}'}, '0 {value} is needed'),
-        ({'read_reply': 'nothing'}, '1 {value} is needed'),
         ({'set_template': 'SET {value:d}'}, 'its step is 20000 Pa, and at most a tenth'),
         ({'command_zero': 0.0001}, 'has 3 decimals, which must express the value of a vent'),
         ({'command_zero': 5.0}, 'must differ from command_zero'),
-        ({'monitor_full': math.nan}, 'monitor_full = nan'),
         ({'terminator': ''}, '1 to 4 ASCII'),
-        ({'channel': 100}, '0 to 99'),
+        ({'set_reply': '', 'setpoint_template': 'REQ'}, '1 {value} is needed'),
         ({'full_scale': 50e3}, 'from 1 to 50000 Pa'),
     ],
 )
@@ -126,3 +123,53 @@ def test_bad_options_name_what_is_allowed(options, words):
     with pytest.raises(ConfigError) as caught:
         create('serial_text', port='somewhere', **options)
     assert words in str(caught.value)
+
+
+# --- SMC ITV ----------------------------------------------------------------------------------
+
+
+def test_commands_of_an_itv(dialogue, until):
+    device = dialogue(
+        [
+            *[('REQ', '0\r\n'), ('MON', '3\r\n')],
+            *[('SET 613', '613\r\n'), ('REQ', '613\r\n'), ('MON', '600\r\n')],  # of 613.8
+            *[('SET 0', '0\r\n'), ('REQ', '0\r\n'), ('MON', '550\r\n')],
+        ],
+        '\r\n',
+    )
+    regulator = create('smc_itv', port=device.path, full_scale=100e3, ceiling=60e3, **SLOW)
+    regulator.open()
+    assert regulator.read().pressure == pytest.approx(3 * COUNT)
+    regulator.set_pressure(60e3)  # the nearest setting is above the ceiling
+    until(lambda: regulator.read().setpoint > 0.0)
+    assert regulator.read().setpoint == pytest.approx(613 * COUNT)
+    assert regulator.read().pressure == pytest.approx(600 * COUNT)
+    assert regulator.read().faults == ()
+    regulator.close()
+
+
+@pytest.mark.parametrize('reply', ['', '-1', '5.0', 'OK', '²'])
+def test_a_count_of_an_itv_is_a_whole_number(reply):
+    regulator = create('smc_itv', port='/dev/somewhere', full_scale=100e3)
+    with pytest.raises(ProtocolError, match='the reply does not match') as caught:
+        regulator.poll(lambda command: reply)
+    assert f"port /dev/somewhere, command 'REQ', reply {reply!r}" in str(caught.value)
+
+
+def test_an_itv_that_is_set_by_its_analogue_input_is_a_fault(emulated, opened, until):
+    device, line = emulated('smc_itv')
+    regulator = opened('smc_itv', port=line.path, full_scale=100e3)
+    device.faults.add('analog_source')
+    regulator.set_pressure(60e3)
+    fault = until(lambda: next(iter(regulator.read().faults), None))
+    assert 'is not in force, but 0 Pa is' in fault and line.path in fault
+    device.faults.clear()
+    until(lambda: abs(regulator.read().setpoint - 60e3) < COUNT)
+    assert regulator.read().faults == ()
+
+
+def test_the_full_scale_of_an_itv_is_needed_and_the_ceiling_is_within_it():
+    with pytest.raises(ConfigError, match="needs the option 'full_scale'"):
+        create('smc_itv', port='somewhere')
+    with pytest.raises(ConfigError, match=r'ceiling = 90000\.0 .* from 1 to 50000 Pa'):
+        create('smc_itv', port='somewhere', full_scale=50e3)

@@ -119,6 +119,19 @@ def test_a_clock_that_goes_back():
     assert regulator.read() == before
 
 
+def test_a_dead_time_goes_on_when_it_is_opened_at_another_time():
+    regulator, clock = opened(dead_time=0.1)
+    regulator.set_pressure(75e3)
+    clock.now = 0.05
+    regulator.close()
+    clock.now = 500.0
+    regulator.open()
+    clock.now = 500.04
+    assert regulator.pad_pressure == 0.0
+    clock.now = 501.0
+    assert regulator.pad_pressure == 75e3
+
+
 def test_a_day_without_a_reading_takes_few_steps(monkeypatch):
     steps = 0
     step = PneumaticChannel.step
@@ -247,7 +260,7 @@ def test_unknown_backend_lists_the_backends():
 
 
 def test_unknown_option_names_the_nearest_and_lists_all():
-    with pytest.raises(ConfigError, match=r"'hose_lenght' \(= 2.0\).*'hose_length'.*ceiling"):
+    with pytest.raises(ConfigError, match=r"'hose_lenght' \(= 2.0\).*ceiling.*'hose_length'"):
         create('simulated', hose_lenght=2.0)
 
 
@@ -255,13 +268,8 @@ def test_unknown_option_names_the_nearest_and_lists_all():
     'name, value, allowed',
     [
         ('ceiling', 120e3, '1 to 100000 Pa'),
-        ('hose_diameter', 4.0, '0.0005 to 0.02 m'),
-        ('hose_conductance', 1.2, '1e-12 to 1e-05 m³/(s Pa)'),
         ('pad_volume', 0.0, '1e-09 to 0.01 m³'),
         ('dead_time', '10 ms', '0 to 1 s'),
-        ('sensor_resolution', 0.0, '0.1 to 1000 Pa'),
-        ('sensor_noise', -1.0, '0 to 10000 Pa'),
-        ('seed', 1.5, 'a whole number'),
         ('clock', 3.0, 'a function'),
     ],
 )

@@ -142,7 +142,9 @@ def test_a_bound_by_hand():
     scene = dataclasses.replace(HEXAPOD, tow=tow, floor=floor)
     line = dict.fromkeys(fidelity.features(scene), 0.0)
     line |= {'constant': -3.0, 'margin': -0.5, 'ample': 0.1}
-    promises = fidelity.Promises({'ch3r': {'bounds': {'L1 distance': line}}})
+    promises = fidelity.Promises(
+        {'ch3r': {'ranges': {}, 'features': {}, 'bounds': {'L1 distance': line}}}
+    )
     margin = 0.8 * 9.81 / (4.0 * math.pi * 0.14)  # 0.8 of the weight over the inertia
     expected = math.exp(-3.0 - 0.5 * math.log(margin) + 0.1 * math.log(margin / 2.0)) - 1e-4
     assert promises.bound('L1', scene, 'flat') == pytest.approx(expected, rel=1e-3)

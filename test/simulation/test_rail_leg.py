@@ -8,6 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
+from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.rail_leg import RailLeg, push
 from ros_pad.simulation.scene import FloorPlan, RailBody, RailGait
 
@@ -175,3 +176,11 @@ def test_bad_pressures(pressures):
     with pytest.raises(InvalidInput, match=r'pressures = .* Pa is not allowed: 1 finite numbers'):
         leg.step(pressures)
     assert leg.time == 0.0
+
+
+def test_a_scene_of_another_robot_is_refused():
+    hexapod = Scene.load('hexapod_patches')
+    with pytest.raises(InvalidInput, match=r'hexapod_patches.* a rail leg is needed'):
+        leg_of(hexapod)
+    with pytest.raises(InvalidInput, match=r'leg_dry_flat.* a robot with legs is needed'):
+        PlanarRobot(SHIPPED, SHIPPED.floor.build(0), 0.004)

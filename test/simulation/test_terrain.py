@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
-import re
 
 import numpy as np
 import pytest
@@ -98,17 +97,9 @@ def test_a_drawing_lies_as_the_robot_sees_it():
     assert floor.wet(0.0, 0.75) and not floor.wet(0.0, 1.25)
 
 
-@pytest.mark.parametrize(
-    'drawing, message',
-    [
-        ((), 'rows of one length'),
-        (('',), 'rows of one length'),
-        (('#.', '#'), 'rows of one length'),
-        (('#.', '#o'), 'rows of one length'),
-    ],
-)
-def test_bad_drawings(drawing, message):
-    with pytest.raises(InvalidInput, match=re.escape(message)):
+@pytest.mark.parametrize('drawing', [(), ('',), ('#.', '#'), ('#.', '#o')])
+def test_bad_drawings(drawing):
+    with pytest.raises(InvalidInput, match='rows of one length'):
         Floor.drawn(drawing, 0.5, FILM)
 
 
@@ -121,9 +112,8 @@ def test_an_even_floor_is_at_zero():
     assert floor.height(0.3, -0.2) == 0.0
 
 
-@pytest.mark.parametrize('seed', [1])
-def test_heights_have_the_spread_and_the_reach_that_are_asked_for(seed):
-    heights = Floor.uniform(False, FILM).uneven(5e-4, seed).heights
+def test_heights_have_the_spread_and_the_reach_that_are_asked_for():
+    heights = Floor.uniform(False, FILM).uneven(5e-4, 1).heights
     assert heights.mean() == pytest.approx(0.0, abs=1e-12)
     assert heights.std() == pytest.approx(5e-4)
     # Correlation exp(-(d/0.05 m)²): 0.527 after two cells of 20 mm, 0.077 after four.
