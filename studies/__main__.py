@@ -45,7 +45,6 @@ STUDIES = {
     'lead_picture': ('closed_loop.lead_picture', 'picture and figures of the README (2 min)'),
     'nodes': ('nodes.cost', 'time of trials and nodes, beside another checkout (20 min)'),
     'flood': ('nodes.flood', 'the regulator node under floods of messages (2 min)'),
-    'signals': ('nodes.signals', 'two signals at any moment to nodes and pad run (15 min)'),
     'fuzz': ('nodes.fuzz', 'every parser against random input (needs atheris)'),
 }
 """Module of each study in this package, and a line about it, with its duration on two cores if it
