@@ -38,10 +38,6 @@ STUDIES = {
     'faults': ('closed_loop.faults', 'a walk with faults, with and without monitor (8 min)'),
     'joints': ('closed_loop.joints', 'walks without markers, beside those with them (10 min)'),
     'labelled_contacts': ('closed_loop.labelled_contacts', 'slip alarm on recorded contacts'),
-    'labelled_pce': (
-        'closed_loop.labelled_pce',
-        'ATLAS on a slippery patch, a Go1 on grease (15 s)',
-    ),
     'lead_picture': ('closed_loop.lead_picture', 'picture and figures of the README (2 min)'),
     'nodes': ('nodes.cost', 'time of trials and nodes, beside another checkout (20 min)'),
     'flood': ('nodes.flood', 'the regulator node under floods of messages (2 min)'),

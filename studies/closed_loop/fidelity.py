@@ -43,6 +43,7 @@ from studies.closed_loop import conformal
 from studies.closed_loop.fidelity_chart import figure
 from studies.closed_loop.random_scenes import BASES, Walk, draw, listed, ranges, walks
 from studies.machine import machine
+from studies.samples import share_interval
 
 CONFIG = command.ROOT / 'config'
 PAGE = command.ROOT / 'docs' / 'model' / 'fidelity.md'
@@ -176,7 +177,7 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
 
 
 def _share(kept: np.ndarray) -> dict[str, Any]:
-    low, high = conformal.interval(int(kept.sum()), len(kept))
+    low, high = share_interval(int(kept.sum()), len(kept))
     return {
         'held_out': len(kept),
         'kept': round(float(kept.mean()), 4),
@@ -262,7 +263,7 @@ def summary(document: dict[str, Any]) -> str:
             kept = sum(round(row['held_out'] * row['kept']) for row in own)
             count = sum(row['held_out'] for row in own)
             share = {'held_out': count, 'kept': kept / count if count else None}
-            share['interval'] = conformal.interval(kept, count)
+            share['interval'] = share_interval(kept, count)
             rows.append({'robot': 'all', 'level, metric': f'{words} {metric}', **share})
     return command.listed(rows)
 

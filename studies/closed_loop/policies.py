@@ -33,6 +33,7 @@ from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop import loops, rivals
 from studies.drawing import BLACK, BLUE, GREEN, STYLE
+from studies.samples import bootstrap
 
 BETTER = 'better fixed shape'
 SCENE = 'hexapod_patches'
@@ -181,12 +182,11 @@ def ratio(distances: Sequence[float], others: Sequence[float]) -> dict[str, floa
     no progress on some floor.)
     """
     ours, theirs = np.array(distances), np.array(others)
-    drawn = np.random.default_rng(0).integers(len(ours), size=(10_000, len(ours)))
-    low, high = np.percentile(ours[drawn].mean(axis=1) / theirs[drawn].mean(axis=1), (2.5, 97.5))
+    low, high = bootstrap(list(zip(distances, others, strict=True)), 10_000)
     return {
         'of_means': round(float(ours.mean() / theirs.mean()), 4),
-        'low': round(float(low), 4),
-        'high': round(float(high), 4),
+        'low': round(low, 4),
+        'high': round(high, 4),
         'least': round(float((ours / theirs).min()), 4),
         'behind': round(float((ours < 0.995 * theirs).mean()), 3),
     }

@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy import stats
 
-from studies.closed_loop.conformal import interval
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, SKY, STYLE, VERMILION
+from studies.samples import share_interval
 from studies.work_precision.estimator.conditions import CONFIGURED, NOT_CONFIGURED
 from studies.work_precision.estimator.methods import CUSUM, RATIO, SHIPPED, SPEED
 from studies.work_precision.estimator.tally import TARGETS, Row
@@ -232,4 +232,4 @@ def _ends(row: Row, measure: str) -> tuple[float, float]:
         low, high = stats.chi2.ppf((0.025, 0.975), (2 * count, 2 * count + 2)) / 2.0
         return (float(low) if count else 0.0) / row.stick_minutes, float(high) / row.stick_minutes
     of = row.slips if measure == 'misses' else row.stances
-    return interval(round(getattr(row, measure) * of), of)
+    return share_interval(round(getattr(row, measure) * of), of)

@@ -45,6 +45,7 @@ from ros_pad.simulation.terrain import CELL, LENGTH, WIDTH
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, STYLE
+from studies.samples import bootstrap
 from studies.work_precision.estimator.walks import SETTLED, Recording, record
 
 NAME = 'priors'
@@ -309,11 +310,9 @@ def _row(
     def ends(key: str) -> list[float]:
         sums = np.array([(part[key].sum(), len(part[key])) for part in parts])
         means = sums[:, 0] / sums[:, 1]
-        if len(parts) >= FEW:
-            chosen = np.random.default_rng(0).integers(0, len(parts), (2000, len(parts)))
-            again = sums[chosen].sum(axis=1)
-            means = np.quantile(again[:, 0] / again[:, 1], [0.025, 0.975])
-        return [round(float(means.min()), 3), round(float(means.max()), 3)]
+        few = len(parts) < FEW
+        low, high = (means.min(), means.max()) if few else bootstrap(sums.tolist(), 2000)
+        return [round(float(low), 3), round(float(high), 3)]
 
     return {
         'condition': condition, 'filter': name, 'phase': phase, 'ground': ground,

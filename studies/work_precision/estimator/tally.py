@@ -14,6 +14,7 @@ import numpy as np
 
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FeetEstimator, FootEstimator
+from studies.samples import bootstrap
 from studies.work_precision.estimator.walks import LOADED, SETTLED, Flags, Floats, Recording
 
 MOVING = 5e-3  # m/s: a faster contact slips
@@ -347,15 +348,12 @@ def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Ro
     )
 
 
-DRAWS = 2000  # of the walks
-
-
 def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
     """Return the row of several walks, with intervals over the walks."""
     whole = Tally()
     for each in tallies:
         whole.add(each)
-    parts = {
+    parts: dict[str, list[tuple[float, float]]] = {
         'misses': [(each.missed, each.slips) for each in tallies],
         'displaced_misses': [(each.displaced_missed, each.displaced) for each in tallies],
         'false_per_minute': [(each.false_alarms, each.stick_time / 60.0) for each in tallies],
@@ -368,13 +366,8 @@ def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
             for found in (_joined(each.covered.values()) for each in tallies)
         ],
     }
-    drawn = np.random.default_rng(0).integers(len(tallies), size=(DRAWS, len(tallies)))
-    intervals = {}
-    for name, pairs in parts.items():
-        hits, all_of = np.array(pairs, dtype=np.float64)[drawn].sum(axis=1).T
-        if (all_of > 0.0).all():
-            ends = np.quantile(hits / all_of, [0.025, 0.975])
-            intervals[name] = [float(end) for end in ends]
+    found = {name: bootstrap(pairs, 2000) for name, pairs in parts.items()}
+    intervals = {name: list(ends) for name, ends in found.items() if math.isfinite(ends[0])}
     return row_of(whole, walks=len(tallies), intervals=intervals, **names)
 
 
