@@ -18,7 +18,6 @@ STUDIES = {
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (20 min)'),
     'priors': ('work_precision.estimator.priors', 'friction with wrong foot files (15 min)'),
-    'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),
     'liquid_limits': ('work_precision.liquid_limits', 'where liquid on meshes fails (4 min)'),
     'sensing': ('sensing.study', 'body and slip from IMU, joints and forces (3 min)'),
     'foreign': ('sensing.foreign', 'the same on recordings of real robots (2 min)'),
