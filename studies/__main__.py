@@ -29,7 +29,7 @@ STUDIES = {
     'behaviour': ('closed_loop.behaviour', 'metrics of every scene, and what changed (5 min)'),
     'assumptions': ('closed_loop.assumptions', 'assumed numbers wrong by a factor of 2 (1 h)'),
     'policies': ('closed_loop.policies', 'policies beside rivals on held-out floors (35 min)'),
-    'force_limits': ('closed_loop.force_limits', 'force limits of pads, and walks (10 min)'),
+    'force_limits': ('closed_loop.force_limits', 'force limits of pads by each criterion (10 s)'),
     'fidelity': (
         'closed_loop.fidelity',
         'bounds of the fidelity levels, and if they hold (40 min)',
