@@ -157,6 +157,12 @@ def write(
     return kept
 
 
+def pasted(page: str, marks: tuple[str, str], text: str) -> str:
+    """Return a page with another text between two marks."""
+    before, rest = page.split(marks[0])
+    return f'{before}{marks[0]}\n{text}\n{marks[1]}{rest.split(marks[1])[1]}'
+
+
 def listed(rows: Sequence[Mapping[str, Any]], title: str = '') -> str:
     """Return rows as a table in text, numbers with four digits."""
 

@@ -59,8 +59,6 @@ HELD_OUT = 200000
 # is more: a robot that slips all the time hardly advances, and feet that stick do not slip.
 LEAST_SHARES = {'distance': 0.5, 'slip': 0.02}
 
-SHARES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-
 GROUPS: dict[str, Any] = {
     'grip margin below 0.7': lambda row: row['margin'] < math.log(0.7),
     'grip margin 0.7 to 1.5': lambda row: row['near'] and row['margin'] >= math.log(0.7),
@@ -134,13 +132,8 @@ def fitted(rows: Sequence[dict[str, Any]], name: str) -> dict[str, Any] | None:
         # On the line, this error is as high as the true one is on the other line.
         factor = np.exp(-other[0] - known[own] @ other[1:])
         apart[own] = (errors[own] + LEAST) * factor - LEAST
-    lines = {}
-    for share in (PROMISE, *SHARES):
-        lines[share] = line.copy()
-        lines[share][0] += conformal.shift(line, known, apart, share)
-    if math.inf in (each[0] for each in lines.values()):
-        return None
-    return {'lines': lines, 'scenes': len(errors)}
+    line[0] += conformal.shift(line, known, apart, PROMISE)
+    return None if math.isinf(line[0]) else {'line': line, 'scenes': len(errors)}
 
 
 def _within(rows: Sequence[dict[str, Any]], spans: dict[str, tuple[float, float]]) -> list[Any]:
@@ -157,7 +150,7 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
     known, found = _arrays(rows, name)
     if not len(found):
         return {'held_out': 0}
-    limits = conformal.bounds(model['lines'][PROMISE], known)
+    limits = conformal.bounds(model['line'], known)
     own = [row['features'] | {'cycles': row['cycles']} for row in rows if name in row['errors']]
     groups = {}
     for group, belongs in GROUPS.items():
@@ -169,10 +162,6 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
         'median_error': float(np.median(found)),
         'median_bound': float(np.median(limits)),
         'groups': groups,
-        'shares': {
-            str(share): _share(found <= conformal.bounds(model['lines'][share], known))
-            for share in SHARES
-        },
     }
 
 
@@ -209,9 +198,7 @@ def judged(stored: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, 
             'ranges': ranges(robot),
             'features': spans,
             'bounds': {
-                name: dict(
-                    zip(['constant', *spans], map(float, model['lines'][PROMISE]), strict=True)
-                )
+                name: dict(zip(['constant', *spans], map(float, model['line']), strict=True))
                 for name, model in known.items()
             },
         }
@@ -305,9 +292,7 @@ def _percent(share: float) -> str:
 
 def pasted(page: str) -> str:
     """Return the text of a page with another table of the shipped scenes between its marks."""
-    before, rest = page.split(MARKS[0])
-    lines = MARKS[0], shipped(), MARKS[1]
-    return before + '\n'.join(lines) + rest.split(MARKS[1])[1]
+    return command.pasted(page, MARKS, shipped())
 
 
 def measure(

@@ -103,7 +103,7 @@ RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
 
 POLICIES = ('flat', 'dome', 'adaptive', *RIVALS, 'oracle')
 PAGE = command.ROOT / 'docs' / 'model' / 'policies.md'
-BEGIN, END = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
+MARKS = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
 MAIN = ('flat', 'dome', 'adaptive', 'each 8 steps', 'oracle')
 
 
@@ -333,12 +333,6 @@ def overall(document: Mapping[str, Any]) -> str:
     return '\n'.join(lines)
 
 
-def written(page: str, tables: str) -> str:
-    """Return docs/model/policies.md with its table replaced."""
-    before, rest = page.split(BEGIN)
-    return f'{before}{BEGIN}\n{tables}\n{END}{rest.split(END)[1]}'
-
-
 # --- picture -------------------------------------------------------------------------------------
 
 _LOOKS = ((BETTER, GREEN, -0.15), ('oracle', BLUE, 0.15))
@@ -431,6 +425,6 @@ def main(words: Sequence[str]) -> int:
     document = measure(*given)
     document = command.write(options.out, 'policies', document, {'policies': draw(document)})
     if options.out == command.CHARTS:
-        PAGE.write_text(written(PAGE.read_text(), overall(document)))
+        PAGE.write_text(command.pasted(PAGE.read_text(), MARKS, overall(document)))
     command.show(options, document, overall(document))
     return 0

@@ -36,7 +36,7 @@ def test_ratio_by_hand():
 def test_the_page_has_the_tables_of_the_last_run():
     document = json.loads((policies.command.CHARTS / 'policies.json').read_text())
     page = policies.PAGE.read_text()
-    assert policies.written(page, policies.overall(document)) == page
+    assert policies.command.pasted(page, policies.MARKS, policies.overall(document)) == page
 
 
 def border(policy, morphology):
