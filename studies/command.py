@@ -8,7 +8,6 @@ import inspect
 import json
 import pathlib
 import re
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from types import ModuleType
@@ -80,22 +79,6 @@ def add_count(
         metavar='N',
         help=text if default is None else f'{text} (default: {default})',
     )
-
-
-def program(word: str) -> str:
-    """Return the path of a program, in the form of a ``type`` of argparse."""
-    found = shutil.which(word)
-    if found is None:
-        raise argparse.ArgumentTypeError(f'{word}: no such program; give its path, or install it')
-    return found
-
-
-def present(word: str) -> pathlib.Path:
-    """Return the path of a file or folder that exists, in the form of a ``type`` of argparse."""
-    path = pathlib.Path(word)
-    if not path.exists():
-        raise argparse.ArgumentTypeError(f'{word}: no such file or folder')
-    return path
 
 
 def add_processes(part: argparse.ArgumentParser) -> None:

@@ -14,7 +14,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
-from unittest import mock
 
 import matplotlib
 import numpy as np
@@ -23,10 +22,7 @@ from matplotlib.figure import Figure
 from ros_pad.capillary.mesh import hexagonal
 from ros_pad.contact.dome import press
 from ros_pad.contact.resistance import DISC_TURNING_RADIUS, DOMED, Foot
-from ros_pad.simulation.scene import Scene
-from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.closed_loop.loops import walk
 from studies.drawing import BLACK, BLUE, ORANGE, SKY, STYLE, VERMILION
 
 FEET = ('large19', 'large37', 'large331', 'small217')
@@ -38,8 +34,6 @@ FINE, COARSE = 200, 24
 
 ANGLES, DIRECTIONS = 91, (0.0, 15.0, 30.0)
 """Mixtures of sliding and turning, and directions of sliding, °, that are tried."""
-
-SCENE, POLICIES = 'hexapod_patches', ('dome', 'flat', 'adaptive')
 
 Force = Callable[[np.ndarray], np.ndarray]
 
@@ -191,15 +185,6 @@ def timed(method: Force, rows: np.ndarray, repeats: int) -> float:
 # --- the study -----------------------------------------------------------------------------------
 
 
-def walked(turning: float, policy: str, seed: int) -> float:
-    """Return how far a walk of :data:`SCENE` on L1 comes, m, with feet of a turning radius, m."""
-    scene = Scene.load(SCENE)
-    with mock.patch.object(Foot, 'turning_radius', turning):
-        loop = ClosedLoop(scene, policy, seed, 'L1')
-        walk(loop, scene)
-    return loop.robot.body[0]
-
-
 def methods_of(name: str, patch: Patch) -> dict[str, Force]:
     """Return each method for a contact."""
     found = {
@@ -216,11 +201,8 @@ def methods_of(name: str, patch: Patch) -> dict[str, Force]:
     return found
 
 
-def run(repeats: int, walks: int) -> dict[str, Any]:
-    """Return the document: for each contact its radii, and errors and time of each method.
-
-    Beside it are walks with the sole's radius and with that of its domes.
-    """
+def run(repeats: int) -> dict[str, Any]:
+    """Return the document: for each contact its radii, and errors and time of each method."""
     document: dict[str, Any] = {'repeats': repeats, 'contacts': {}}
     for name, patch in command.each(list(patches().items()), 'limit_surface', 'contact'):
         truth = summed(patch.points, patch.shares)(twists(patch))
@@ -238,26 +220,17 @@ def run(repeats: int, walks: int) -> dict[str, Any]:
             ]).round(5).tolist(),
             'methods': methods,
         }  # fmt: skip
-    on_domes = domes(Scene.load(SCENE).foot, COARSE)
-    cases = [(policy, seed) for policy in POLICIES for seed in range(walks)]
-    document['walks'] = [
-        (policy, seed, walked(on_domes.turning, policy, seed),
-         walked(on_domes.own_turning, policy, seed))
-        for policy, seed in command.each(cases, 'limit_surface: walks', 'pair')
-    ]  # fmt: skip
     return document
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return errors and times by contact and method, and the walks."""
+    """Return errors and times by contact and method."""
     rows = [
         {'contact': name, 'rho/R': row['own_turning'], 'method': method, **found}
         for name, row in document['contacts'].items()
         for method, found in row['methods'].items()
     ]
-    names = ('policy', 'seed', 'shipped, m', 'own radius, m')
-    walks = [dict(zip(names, walk, strict=True)) for walk in document['walks']]
-    return f'{command.listed(rows)}\n{command.listed(walks)}'
+    return command.listed(rows)
 
 
 def draw(document: dict[str, Any]) -> Figure:
@@ -292,10 +265,9 @@ def main(words: Sequence[str]) -> int:
     """Measure, print, draw and write."""
     parser = command.parser('limit_surface', __doc__)
     command.add_count(parser, '--repeats', 5, 'how often each method is timed')
-    command.add_count(parser, '--walks', 6, 'pairs of walks with each policy', least=0)
     command.add_out(parser)
     options = parser.parse_args(words)
-    document = run(options.repeats, options.walks)
+    document = run(options.repeats)
     kept = command.write(options.out, 'limit_surface', document, {'limit_surface': draw(document)})
     command.show(options, kept, table(document))
     return 0
