@@ -21,7 +21,6 @@ STUDIES = {
     'sensing': ('sensing.study', 'body and slip from IMU, joints and forces (3 min)'),
     'foreign': ('sensing.foreign', 'the same on recordings of real robots (2 min)'),
     'film': ('work_precision.film', 'liquid squeezed from under soft pads (6 min)'),
-    'hose': ('work_precision.hose', 'how long a pad takes to fill through a hose (1 min)'),
     'bench': ('thesis.bench_command', 'one pad of the thesis beside its measurements (5 s)'),
     'thesis': ('thesis.command', 'all figures and statements of the thesis (1 min)'),
     'behaviour': ('closed_loop.behaviour', 'metrics of every scene, and what changed (5 min)'),

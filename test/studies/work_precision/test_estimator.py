@@ -232,9 +232,8 @@ def test_higher_thresholds_detect_less(rows):
     mine = [row for row in rows if row.part == 'methods']
     assert {row.slips for row in mine} == {mine[0].slips}
     assert mine[0].slips > 10
-    for name in (methods.RATIO, methods.SPEED):
-        misses = [row.misses for row in mine if row.name == name]
-        assert misses == sorted(misses)
+    misses = [row.misses for row in mine if row.name == methods.RATIO]
+    assert misses == sorted(misses)
     shipped = mine[-1]
     assert shipped.shipped
     same = [row for row in mine if row.name == methods.CUSUM and row.value == 4.0]
