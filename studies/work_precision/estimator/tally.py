@@ -45,10 +45,8 @@ class Estimates:
     Attributes
     ----------
     slipping, standing, fresh : array of bool
-    wet, mean, sd, margin, speed : array
-        P(wet), friction and its standard deviation, friction margin, slip speed in m/s.
-    updates : int
-        Number of samples.
+    wet, mean, sd, margin : array
+        P(wet), friction and its standard deviation, friction margin.
     """
 
     slipping: Flags
@@ -58,15 +56,13 @@ class Estimates:
     mean: Floats
     sd: Floats
     margin: Floats
-    speed: Floats
-    updates: int
 
 
 def replay(walk: Recording) -> Estimates:
     """Return the results for the readings of a robot, whose feet learn together."""
     legs = walk.load.shape[1]
     estimators = FootEstimator.of(FeetEstimator(legs, *walk.settings))
-    out = np.empty((*walk.load.shape, 8))
+    out = np.empty((*walk.load.shape, 7))
     rows = walk.rows
     for sample, (stamp, arrived) in enumerate(
         zip(walk.stamps.tolist(), walk.arrived.tolist(), strict=True)
@@ -82,13 +78,12 @@ def replay(walk: Recording) -> Estimates:
             now = estimator.estimate
             found.append(
                 (now.slipping, now.standing, new and now.fresh, now.wet_probability,
-                 now.friction_mean, now.friction_sd, now.margin, now.slip_speed)
+                 now.friction_mean, now.friction_sd, now.margin)
             )  # fmt: skip
         out[sample] = found
     slipping, standing, fresh = np.moveaxis(out[..., :3] > 0.5, 2, 0)
-    wet, mean, sd, margin, speed = np.moveaxis(out[..., 3:], 2, 0)
-    updates = int(walk.arrived.sum())
-    return Estimates(slipping, standing, fresh, wet, mean, sd, margin, speed, updates)
+    wet, mean, sd, margin = np.moveaxis(out[..., 3:], 2, 0)
+    return Estimates(slipping, standing, fresh, wet, mean, sd, margin)
 
 
 @dataclass

@@ -126,7 +126,7 @@ def test_estimates_are_compared_with_the_truth():
     ones = np.ones((1000, 1))
     found = tally.Estimates(
         slipping=ones < 0, standing=ones > 0, fresh=ones > 0, wet=0.2 * ones, mean=0.4 * ones,
-        sd=np.where(wet, 0.04, 0.06), margin=np.where(wet, 0.31, 0.29), speed=ones, updates=1000,
+        sd=np.where(wet, 0.04, 0.06), margin=np.where(wet, 0.31, 0.29),
     )  # fmt: skip
     counts = Tally()
     tally.count_estimates(counts, case, found)
@@ -191,7 +191,7 @@ def test_messages(plain):
     assert np.flatnonzero(slow.arrived[:, 0])[:3].tolist() == [0, 5, 10]
     late = conditions.late_position(plain, 0.02, generator()).position
     assert (late[5:] == plain.position[:-5]).all()
-    assert tally.replay(slow).updates == 6 * 200
+    assert slow.arrived.sum() == 6 * 200
 
 
 # --- the study ----------------------------------------------------------------------------------
