@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import pathlib
 from collections.abc import Sequence
-from contextlib import suppress
 
 import matplotlib
 
@@ -46,17 +45,13 @@ def main(words: Sequence[str]) -> int:
     trial = bench.run(scene)
     folder = new_folder(options.out, scene.name)
     report, files = folder / 'report.html', []
-    try:
-        with matplotlib.rc_context(PAPER_STYLE):
-            drawn = bench_figures.draw(trial)
-            for number, each in drawn.items():
-                for kind in ('png', 'pdf'):
-                    files.append(folder / f'figure_{number}.{kind}')
-                    save(files[-1], rendered(each.figure, kind, dpi=DPI))
-        page.write_bench(trial, drawn, report)
-    finally:
-        with suppress(OSError):  # remove an empty folder, so that the name can be used again
-            folder.rmdir()
+    with matplotlib.rc_context(PAPER_STYLE):
+        drawn = bench_figures.draw(trial)
+        for number, each in drawn.items():
+            for kind in ('png', 'pdf'):
+                files.append(folder / f'figure_{number}.{kind}')
+                save(files[-1], rendered(each.figure, kind, dpi=DPI))
+    page.write_bench(trial, drawn, report)
     summary = trial.as_dict() | {'report': str(report), 'figures': [str(file) for file in files]}
     text = json.dumps(summary, indent=1, allow_nan=False)
     save(folder / 'summary.json', (text + '\n').encode())

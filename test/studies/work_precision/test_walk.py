@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 import importlib.util
 import math
-import sys
 from dataclasses import replace
 
 import mpmath
 import numpy as np
 import pytest
 
-from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.errors import InvalidInput
 from ros_pad.simulation import RailLeg, Scene
 from ros_pad.simulation.full_robot import FullRobot
 from studies.work_precision.walk import chart, hexapod, rail, results, study
@@ -163,13 +162,6 @@ def test_two_references_leave_a_band():
 # --- Drake --------------------------------------------------------------------------------------
 
 
-def test_without_drake_the_error_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'pydrake', None)
-    case = hexapod.hexapod_walks()[0]
-    with pytest.raises(ConfigError, match='pip install drake'):
-        DrakeRobot(case.scene, case.scene.floor.build(0), 4e-3, 4e-4)
-
-
 def towed():
     """Return the walk with 9 N in tow on dry ground."""
     return hexapod.hexapod_walks()[-1]
@@ -262,14 +254,3 @@ def test_the_rail_leg_against_integrators(measured_walks):
     assert found['solve_ivp, events, 1e-6'].worst['distance'] < 1e-5
     ways = [found[f'RailLeg, {step} ms'].worst['distance'] for step in ('0.1', '1', '4')]
     assert ways[0] < 0.3 * ways[1] < 0.3 * ways[2]
-
-
-def test_table_and_picture(measured_walks, tmp_path):
-    text = chart.table(measured_walks)
-    assert 'L2, top, 0.25 ms' in text
-    assert 'pip install drake' in text
-    assert 'wet, dome' in text
-    pictures = chart.figures(measured_walks)
-    assert set(pictures) == {'walk'}
-    pictures['walk'].savefig(tmp_path / 'walk.png')
-    assert (tmp_path / 'walk.png').stat().st_size > 50_000
