@@ -4,25 +4,19 @@
 import dataclasses
 import math
 import pathlib
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 import yaml
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
 from ros_pad import configuration
 from ros_pad.errors import ConfigError
 from studies.thesis import bench
 from studies.thesis.bench import CODED
-from studies.thesis.tangential import slip_force
 
 BENCHES = ('inflation', 'press', 'tangential', 'foot')
 
 TRIALS = {kind: bench.run(f'bench_{kind}') for kind in BENCHES}
-ONE = TRIALS['tangential'].scene.foot
-DRAG = SimpleNamespace(film_thickness=3e-4, viscosity=1e-3, speed=2e-4, dwell=1.0)
 
 
 def errors(rows):
@@ -91,42 +85,6 @@ def test_pressed_domes_against_what_was_measured():
         for own, found in zip(PROGRAM['height'], (1.8e-3, 1.4e-3, 1.0e-3), strict=True)
     ]
     assert all(row.claimed == 'no error stated' for row in trial.rows)
-
-
-def drained(radius, contact_pressure, time, viscosity=1e-3, start=3e-4):
-    """Return the film, m, by integrating Stefan's equation for the logarithm of the film."""
-    rate = 2.0 * contact_pressure / (3.0 * viscosity * radius**2)
-    solved = solve_ivp(
-        lambda _, y: -rate * np.exp(2.0 * y), (0.0, time), [math.log(start)],
-        method='Radau', rtol=1e-7, atol=1e-8,
-    )  # fmt: skip
-    return math.exp(solved.y[0, -1])
-
-
-@pytest.mark.parametrize('load, pressure, sole', [(0.3, 75e3, 12e-3), (0.4, 0.0, 3.2e-3)])
-def test_onset_of_slip_by_another_method(load, pressure, sole):
-    """The film is integrated; slip begins where the pull first exceeds the friction."""
-    foot = dataclasses.replace(ONE, sole_radius=sole)
-    if pressure:
-        area = load / pressure
-        radius, squeeze = math.sqrt(area / math.pi), pressure
-    else:
-        area = min(load / 10444.0, math.pi * sole**2)
-        radius, squeeze = sole, load / (math.pi * sole**2)
-    dry = 0.35 * load + 4700.0 * area
-    stiffness = 5000.0 / 19.0
-
-    def spare(pull):
-        film = drained(radius, squeeze, 1.0 + pull / (stiffness * 2e-4))
-        touching = math.exp(-((film / 0.5e-6) ** 2))
-        return pull - touching * dry - (1.0 - touching) * 0.12 * load
-
-    pulls = np.linspace(0.0, dry, 11)
-    first = next(k for k, pull in enumerate(pulls) if spare(pull) >= 0.0)
-    expected = brentq(spare, pulls[first - 1], pulls[first], xtol=1e-7)
-    found = slip_force(foot, DRAG, load, pressure, True)
-    assert found == pytest.approx(expected, rel=1e-4)
-    assert slip_force(foot, DRAG, load, pressure, False) == pytest.approx(dry, rel=1e-12)
 
 
 def test_orderings_of_the_thesis():
