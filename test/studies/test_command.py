@@ -66,7 +66,8 @@ def test_a_work_precision_study_writes_table_json_and_pictures(tmp_path, capsys)
 
 
 def test_processes_keep_the_order_and_pass_errors_on():
-    assert command.in_processes(divmod, [(7, 2), (9, 4)], 2, 'test') == [(3, 1), (2, 1)]
+    cases = [(number, 3) for number in range(20)]
+    assert command.in_processes(divmod, cases, 2, 'test') == [divmod(*each) for each in cases]
     with pytest.raises(ZeroDivisionError):
         command.in_processes(divmod, [(7, 2), (9, 0)], 1, 'test')
 

@@ -248,3 +248,6 @@ def test_the_study_changes_what_it_names():
             elif not assumption.path.startswith('both'):
                 back = assumptions.changed(altered, assumption.path, value)
                 assert back == setup
+            if assumption.path.startswith('both'):
+                configured = assumption.path.replace('both.', 'configured.')
+                assert assumptions.value_at(altered, configured) == got
