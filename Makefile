@@ -59,7 +59,7 @@ docs: .venv/test.stamp
 	$(BIN)/python -m pytest test/test_site.py test/test_docs.py test/test_tutorials.py $(ARGS)
 	@echo 'site:     $(SITE)/index.html'
 
-STUDIES := contact meniscus capillary walk stability estimator hose film
+STUDIES := contact meniscus capillary walk stability estimator film
 
 # What takes minutes at most; `python -m studies` lists the longer ones.
 studies: .venv/test.stamp

@@ -7,7 +7,6 @@ import argparse
 import inspect
 import json
 import pathlib
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from types import ModuleType
@@ -77,22 +76,6 @@ def add_count(
     )
 
 
-def program(word: str) -> str:
-    """Return the path of a program, in the form of a ``type`` of argparse."""
-    found = shutil.which(word)
-    if found is None:
-        raise argparse.ArgumentTypeError(f'{word}: no such program; give its path, or install it')
-    return found
-
-
-def present(word: str) -> pathlib.Path:
-    """Return the path of a file or folder that exists, in the form of a ``type`` of argparse."""
-    path = pathlib.Path(word)
-    if not path.exists():
-        raise argparse.ArgumentTypeError(f'{word}: no such file or folder')
-    return path
-
-
 def add_processes(part: argparse.ArgumentParser) -> None:
     """Add ``--processes``."""
     add_count(part, '--processes', 2, 'how many processes run at once')
@@ -150,6 +133,12 @@ def write(
     for picture, figure in (pictures or {}).items():
         save(folder / f'{picture}.png', rendered(figure, 'png', dpi=DPI))
     return kept
+
+
+def pasted(page: str, marks: tuple[str, str], text: str) -> str:
+    """Return a page with another text between two marks."""
+    before, rest = page.split(marks[0])
+    return f'{before}{marks[0]}\n{text}\n{marks[1]}{rest.split(marks[1])[1]}'
 
 
 def listed(rows: Sequence[Mapping[str, Any]], title: str = '') -> str:

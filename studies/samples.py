@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -39,9 +40,22 @@ def auc(positive: np.ndarray, negative: np.ndarray) -> float:
     return float(wins / (len(positive) * len(negative)))
 
 
-def share_interval(hits: int, count: int) -> list[float]:
-    """Return the 95 % interval of a share (Wilson 1927)."""
+def share_interval(hits: int, count: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share (Clopper and Pearson 1934)."""
     if not count:
-        return [0.0, 1.0]
-    interval = stats.binomtest(hits, count).proportion_ci(method='wilson')
-    return [float(interval.low), float(interval.high)]
+        return 0.0, 1.0
+    found = stats.binomtest(hits, count).proportion_ci(0.95, 'exact')
+    return float(found.low), float(found.high)
+
+
+def bootstrap(pairs: Sequence[Sequence[float]], draws: int) -> tuple[float, float]:
+    """Return the 95 % interval of Σ hits over Σ counts, of pairs of both that are drawn anew.
+
+    NaN where a draw has no counts.
+    """
+    drawn = np.random.default_rng(0).integers(len(pairs), size=(draws, len(pairs)))
+    hits, counts = np.array(pairs, dtype=float)[drawn].sum(axis=1).T
+    if not (counts > 0.0).all():
+        return math.nan, math.nan
+    low, high = np.quantile(hits / counts, (0.025, 0.975))
+    return float(low), float(high)

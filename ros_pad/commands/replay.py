@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     check_picture(options.figure)
     refuse_existing('--out', options.out)
     try:
-        with bar('opening', 1.0, 'bag', delay=1.0) as show:
+        with bar('opening', 1.0, 'bag') as show:
             bag = BagReader(options.bag, show)
         settings = NodeSettings.of(bag).changed(values, options.policy, options.foot)
         with bar('replay', 1.0, 'bag') as show:

@@ -72,7 +72,7 @@ _ADVICE = {
     ' --method energy',
     'far_apart': 'in gaps this wide the surface is not level: use --method energy',
 }
-# Relative errors of heights that are returned, as measured by `studies liquid_limits`.
+# Relative errors of heights that are returned, as measured at commit 07dfc820 by a study.
 _ERRORS = {'energy': (-0.14, 0.18), 'force': (-0.13, 0.29), 'thesis': (-0.13, 0.29)}
 _ERROR_OF_LEVEL = (-0.03, 0.0)
 _SIZES = {

@@ -44,6 +44,7 @@ LEVEL = 'L2'
 CYCLES = 20
 SEEDS = (0, 1, 2, 3)
 FIXED = ('flat', 'dome')
+SHIPPED = 'as shipped'
 
 
 def defaults(function: Callable[..., Any], *names: str) -> dict[str, Any]:
@@ -298,26 +299,10 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     return loop.robot.body[0] / world.cycles, loop.robot.verdict
 
 
-def cases(setup: Setup) -> dict[str, Setup]:
-    """Return the shipped setup, and setups where adapting is expected to gain little, by name."""
-
-    def at(path: str, value: Any) -> Setup:
-        return changed(setup, path, value)
-
-    return {
-        'as shipped': setup,
-        'dry all over': at('world.floor.kind', 'dry'),
-        'wet all over': at('world.floor.kind', 'wet'),
-        'patches, nothing towed': at('world.tow.weight', 0.0),
-        'patches, half the towed weight': at('world.tow.weight', 6.0),
-        'patches of 0.3 m': at('world.floor.patch_length', 0.3),
-    }  # fmt: skip
-
-
 def setups() -> dict[str, Setup]:
     """Return every setup that is walked, by name."""
     setup = shipped()
-    named = {f'case: {name}': case for name, case in cases(setup).items()}
+    named = {SHIPPED: setup}
     for assumption in ASSUMPTIONS:
         for factor in (0.5, 2.0):
             named[f'{assumption.where} x {factor}'] = wrong_by(setup, assumption, factor)
@@ -329,9 +314,7 @@ def jobs() -> list[tuple[str, str, int]]:
 
     Fixed morphologies do not walk again where a number does not affect them.
     """
-    wanted: list[tuple[str, tuple[str, ...]]] = [
-        (f'case: {name}', ('adaptive', *FIXED, 'oracle')) for name in cases(shipped())
-    ]
+    wanted: list[tuple[str, tuple[str, ...]]] = [(SHIPPED, ('adaptive', *FIXED, 'oracle'))]
     for assumption in ASSUMPTIONS:
         policies = ('adaptive',) if assumption.only_adaptive else ('adaptive', *FIXED)
         wanted += [(f'{assumption.where} x {factor}', policies) for factor in (0.5, 2.0)]
@@ -366,7 +349,7 @@ def measure(processes: int) -> dict[str, Any]:
         return result
 
     setup = shipped()
-    base = figures('case: as shipped')
+    base = figures(SHIPPED)
     rows = []
     for assumption in ASSUMPTIONS:
         value = baseline(setup, assumption)
@@ -387,7 +370,6 @@ def measure(processes: int) -> dict[str, Any]:
         'seeds': list(SEEDS),
         'wall_s': round(time.perf_counter() - started, 1),
         'shipped': base,
-        'cases': {name: figures(f'case: {name}') for name in cases(setup)},
         'assumptions': rows,
     }
 
@@ -398,16 +380,6 @@ def table(document: dict[str, Any]) -> str:
     for row in document['assumptions']:
         halves = [cell(row[word]) for word in ('halved', 'doubled')]
         lines.append(f'| `{row["where"]}` | {halves[0]} | {halves[1]} |')
-    lines += [
-        '',
-        '| ground | flat | dome | adaptive | oracle | gain |',
-        '|---|---|---|---|---|---|',
-    ]
-    for name, case in document['cases'].items():
-        distances = ' | '.join(
-            f'{case[f"{policy}_mm"]:.1f}' for policy in ('flat', 'dome', 'adaptive', 'oracle')
-        )
-        lines.append(f'| {name} | {distances} | {case["gain_mm"]:+.1f} |')
     return '\n'.join(lines)
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize
 
 from ros_pad.simulation.fidelity import LEAST
 
@@ -82,11 +82,3 @@ def bounds(line: Array, features: Array) -> Array:
     """Return the bounds of errors on a line."""
     found: Array = np.maximum(LEAST, np.exp(line[0] + features @ line[1:]) - LEAST)
     return found
-
-
-def interval(kept: int, count: int, level: float = 0.95) -> tuple[float, float]:
-    """Return the interval of a share that was found, by Clopper and Pearson."""
-    if not count:
-        return 0.0, 1.0
-    found = stats.binomtest(kept, count).proportion_ci(level, 'exact')
-    return float(found.low), float(found.high)

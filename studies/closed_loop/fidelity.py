@@ -43,6 +43,7 @@ from studies.closed_loop import conformal
 from studies.closed_loop.fidelity_chart import figure
 from studies.closed_loop.random_scenes import BASES, Walk, draw, listed, ranges, walks
 from studies.machine import machine
+from studies.samples import share_interval
 
 CONFIG = command.ROOT / 'config'
 PAGE = command.ROOT / 'docs' / 'model' / 'fidelity.md'
@@ -57,8 +58,6 @@ HELD_OUT = 200000
 # Errors are relative to distance or slip, or to these shares of the distance without slip if that
 # is more: a robot that slips all the time hardly advances, and feet that stick do not slip.
 LEAST_SHARES = {'distance': 0.5, 'slip': 0.02}
-
-SHARES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
 GROUPS: dict[str, Any] = {
     'grip margin below 0.7': lambda row: row['margin'] < math.log(0.7),
@@ -133,13 +132,8 @@ def fitted(rows: Sequence[dict[str, Any]], name: str) -> dict[str, Any] | None:
         # On the line, this error is as high as the true one is on the other line.
         factor = np.exp(-other[0] - known[own] @ other[1:])
         apart[own] = (errors[own] + LEAST) * factor - LEAST
-    lines = {}
-    for share in (PROMISE, *SHARES):
-        lines[share] = line.copy()
-        lines[share][0] += conformal.shift(line, known, apart, share)
-    if math.inf in (each[0] for each in lines.values()):
-        return None
-    return {'lines': lines, 'scenes': len(errors)}
+    line[0] += conformal.shift(line, known, apart, PROMISE)
+    return None if math.isinf(line[0]) else {'line': line, 'scenes': len(errors)}
 
 
 def _within(rows: Sequence[dict[str, Any]], spans: dict[str, tuple[float, float]]) -> list[Any]:
@@ -156,7 +150,7 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
     known, found = _arrays(rows, name)
     if not len(found):
         return {'held_out': 0}
-    limits = conformal.bounds(model['lines'][PROMISE], known)
+    limits = conformal.bounds(model['line'], known)
     own = [row['features'] | {'cycles': row['cycles']} for row in rows if name in row['errors']]
     groups = {}
     for group, belongs in GROUPS.items():
@@ -168,15 +162,11 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
         'median_error': float(np.median(found)),
         'median_bound': float(np.median(limits)),
         'groups': groups,
-        'shares': {
-            str(share): _share(found <= conformal.bounds(model['lines'][share], known))
-            for share in SHARES
-        },
     }
 
 
 def _share(kept: np.ndarray) -> dict[str, Any]:
-    low, high = conformal.interval(int(kept.sum()), len(kept))
+    low, high = share_interval(int(kept.sum()), len(kept))
     return {
         'held_out': len(kept),
         'kept': round(float(kept.mean()), 4),
@@ -208,9 +198,7 @@ def judged(stored: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, 
             'ranges': ranges(robot),
             'features': spans,
             'bounds': {
-                name: dict(
-                    zip(['constant', *spans], map(float, model['lines'][PROMISE]), strict=True)
-                )
+                name: dict(zip(['constant', *spans], map(float, model['line']), strict=True))
                 for name, model in known.items()
             },
         }
@@ -262,7 +250,7 @@ def summary(document: dict[str, Any]) -> str:
             kept = sum(round(row['held_out'] * row['kept']) for row in own)
             count = sum(row['held_out'] for row in own)
             share = {'held_out': count, 'kept': kept / count if count else None}
-            share['interval'] = conformal.interval(kept, count)
+            share['interval'] = share_interval(kept, count)
             rows.append({'robot': 'all', 'level, metric': f'{words} {metric}', **share})
     return command.listed(rows)
 
@@ -304,9 +292,7 @@ def _percent(share: float) -> str:
 
 def pasted(page: str) -> str:
     """Return the text of a page with another table of the shipped scenes between its marks."""
-    before, rest = page.split(MARKS[0])
-    lines = MARKS[0], shipped(), MARKS[1]
-    return before + '\n'.join(lines) + rest.split(MARKS[1])[1]
+    return command.pasted(page, MARKS, shipped())
 
 
 def measure(

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the criteria of the force limit: on one pad, with other pads, and in walks.
+"""Compare the criteria of the force limit, on one pad and with other pads.
 
 Prints the force limits of two pads by every criterion beside the three that were measured; by
-which power of stiffness, radius and pressure each of them grows; what a pad of another sheet or
-radius carries; and walks with the default criterion and with the measured line. Stiffness is
-changed alone, at the same thickness. Writes force_limits.json and .png.
+which power of stiffness, radius and pressure each of them grows; and what a pad of another sheet
+or radius carries. Stiffness is changed alone, at the same thickness. Writes force_limits.json and
+.png.
 """
 
 from __future__ import annotations
 
 import math
-import statistics
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -22,8 +21,6 @@ from matplotlib.figure import Figure
 from ros_pad.contact import LARGE_PAD, Material, Pad, force_limit
 from ros_pad.contact.limits import CRITERIA, criteria, largest_pressure
 from ros_pad.errors import NoEquilibrium
-from ros_pad.simulation import Scene
-from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.drawing import STYLE
 
@@ -37,18 +34,6 @@ PRESSURES = (5e3, 20e3, 50e3, *MEASURED)
 STIFFER = (0.8, 1.0, 1.2, 1.5, 2.0, 3.0)
 RADII = (0.5e-3, 0.75e-3, 1.0e-3, 1.25e-3, 1.5e-3)
 AT = 75e3  # Pa, pressure at which pads are compared
-
-WALKS = {
-    'hexapod_patches': ('adaptive', 'dome'),
-    'quadruped_patches': ('adaptive', 'dome'),
-    'hexapod_smooth_wet_dome': ('dome',),
-    'hexapod_rough_wet_dome': ('dome',),
-    'leg_wet_dome_40': ('dome',),
-    'leg_wet_dome_60': ('dome',),
-    'leg_wet_dome_75': ('dome',),
-}
-"""Scenes with domes, and their policies."""
-LIMITS = ('measured', 'thickness')
 
 
 def dragon_skin() -> Pad:
@@ -123,41 +108,6 @@ def pads() -> dict[str, Any]:
     }
 
 
-def walk(scene: str, policy: str, criterion: str, seed: int) -> dict[str, Any]:
-    """Walk a scene with feet of a criterion."""
-    world = Scene.load(scene)
-    world = replace(world, foot=replace(world.foot, limit=criterion))
-    loop = ClosedLoop(world, policy, seed)
-    domed, samples = [], 0
-    for _ in loop.walk():
-        samples += len(world.legs)
-        domed += [p for p in map(loop.controller.setpoint, world.legs) if p > 0.0]
-    cycles = (loop.robot.time - world.settle) / world.gait.cycle
-    return {
-        'mm_a_cycle': 1e3 * loop.robot.body[0] / cycles,
-        'domed': len(domed) / samples,
-        'kpa': 1e-3 * statistics.fmean(domed) if domed else 0.0,
-        'verdict': loop.robot.verdict,
-    }
-
-
-def walks(seeds: int, processes: int) -> list[dict[str, Any]]:
-    """Return what walks of every scene, policy and criterion do, mean over seeds."""
-    keys = [(s, p, c) for s, policies in WALKS.items() for p in policies for c in LIMITS]
-    cases = [(*key, seed) for key in keys for seed in range(seeds)]
-    found = command.in_processes(walk, cases, processes, 'force limits')
-    rows = []
-    for index, key in enumerate(keys):
-        own = found[index * seeds : (index + 1) * seeds]
-        rows.append(
-            dict(zip(('scene', 'policy', 'criterion'), key, strict=True))
-            | {name: statistics.fmean(each[name] for each in own) for name in list(own[0])[:3]}
-            | {'each_mm': [round(each['mm_a_cycle'], 2) for each in own]}
-            | {'verdicts': sorted({each['verdict'] for each in own if each['verdict']})}
-        )
-    return rows
-
-
 def table(document: dict[str, Any]) -> str:
     """Return the tables of docs/model/force_limit.md."""
     lines = []
@@ -176,7 +126,7 @@ def table(document: dict[str, Any]) -> str:
     radii = document['radii'].items()
     rows = [{'criterion': c, **dict(zip(heads, values, strict=True))} for c, values in radii]
     lines.append(command.listed(rows, 'load over area, Pa'))
-    return '\n\n'.join([*lines, command.listed(document['walks'])])
+    return '\n\n'.join(lines)
 
 
 def draw() -> Figure:
@@ -207,11 +157,8 @@ def main(words: Sequence[str]) -> int:
     """Run the study; return the exit status."""
     part = command.parser('force_limits', __doc__)
     command.add_out(part)
-    command.add_count(part, '--seeds', 3, 'walks of each kind; 0 for pads alone', least=0)
-    command.add_processes(part)
     options = part.parse_args(words)
-    found = walks(options.seeds, options.processes) if options.seeds else []
-    document = pads() | {'walks': found}
+    document = pads()
     command.write(options.out, 'force_limits', document, {'force_limits': draw()})
     command.show(options, document, table(document))
     return 0

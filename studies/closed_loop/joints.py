@@ -28,6 +28,7 @@ from ros_pad.trials.series import held
 from ros_pad.trials.trial import heading
 from studies import command
 from studies.closed_loop import loops
+from studies.samples import runs
 from studies.work_precision.estimator.tally import MOVING, Tally, count_alarms
 
 SCENES = ('hexapod_patches', 'quadruped_patches')
@@ -36,8 +37,6 @@ GATE = 0.3
 """Share of the expected load above which a foot stands."""
 
 BEGINS = 2.0  # s: from then on the robot walks
-WINDOW = 5  # samples over which a contact velocity is the mean
-LANDED = 12  # samples after which a stance counts for the velocity: feet skid when they land
 STICKS = 0.9
 """Share of a stance in which at least one foot must stick for its verdict to count."""
 
@@ -58,9 +57,9 @@ class Walk:
         Slip alarm, true ground, and whether the pad is flat.
     probability : ndarray
         Estimated P(wet).
-    body, feet : ndarray, shape (n, 2)
-        Errors of velocities of body and contacts, x and y, m/s, and their stated deviations:
-        one row for each component.
+    body : ndarray, shape (n, 2)
+        Errors of the velocity of the body, x and y, m/s, and their stated deviations: one row for
+        each component.
     doubt : float
         Share of samples in which the body was in doubt.
     distance : float
@@ -81,7 +80,6 @@ class Walk:
     flat: np.ndarray
     probability: np.ndarray
     body: np.ndarray
-    feet: np.ndarray
     doubt: float
     distance: float
     verdict: str | None
@@ -89,23 +87,16 @@ class Walk:
 
 
 class _Truth:
-    """Compare each estimate of the body with the true motion of body and contacts."""
+    """Compare each estimate of the body with its true motion."""
 
     def __init__(self, robot: Any) -> None:
         self._robot = robot
-        self._geoms = [robot.model.geom(f'foot_{leg}').id for leg in robot.legs]
-        self._places: list[np.ndarray] = []
-        self._ages = np.zeros(len(robot.legs), dtype=int)
         self.body: list[tuple[float, float]] = []
-        self.feet: list[tuple[float, float]] = []
         self.doubts: list[bool] = []
 
-    def compare(self, estimate: BodyEstimate | None, gate: float) -> None:
+    def compare(self, estimate: BodyEstimate | None) -> None:
         """Add the errors of a sample; call it for each."""
         robot = self._robot
-        # The contact is ahead of the marker by the shear of the pads.
-        self._places = [*self._places[-WINDOW:], robot.data.geom_xpos[self._geoms, :2]]
-        self._ages = np.where(robot.contacts[:, 2] > gate, self._ages + 1, 0)
         if estimate is None or robot.time < BEGINS:
             return
         self.doubts.append(bool(estimate.doubt))
@@ -117,11 +108,6 @@ class _Truth:
         miss = estimate.velocity[:2] - to_odom @ robot.data.qvel[:2]
         deviations = np.sqrt(np.diag(estimate.covariance)[6:8])
         self.body += zip(miss.tolist(), deviations.tolist(), strict=True)
-        moved = (self._places[-1] - self._places[0]) / (WINDOW * robot.period) @ to_odom.T
-        for index in np.flatnonzero(self._ages > LANDED):
-            foot = estimate.feet[index]
-            miss = foot.slip_velocity - moved[index]
-            self.feet += [(each, foot.slip_velocity_sd) for each in miss.tolist()]
 
 
 def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk:
@@ -129,12 +115,12 @@ def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk
     scene = replace(Scene.load(name), cycles=cycles)
     loop = ClosedLoop(scene, policy, seed, 'L2', sensing=sensing)
     robot, log = loop.robot, loop.log
-    truth, gate = _Truth(robot), GATE * scene.expected_load
+    truth = _Truth(robot)
     rows = []
     for _ in loop.walk():
         rows.append([(foot.force[2], foot.slip_speed, foot.wet) for foot in robot.feet])
         if loop.body:
-            truth.compare(loop.body.estimate, gate)
+            truth.compare(loop.body.estimate)
     load, speed, wet = np.moveaxis(np.array(rows, dtype=float), 2, 0)
     stamps = loop.period_ns * np.arange(1, len(rows) + 1)
     estimate = loops.estimated(
@@ -154,7 +140,6 @@ def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk
         loops.pressures(log.records, stamps) < DOME_PRESSURE,
         held(estimate.stamps, estimate.rows['wetness'], stamps),
         np.array(truth.body).reshape(-1, 2),
-        np.array(truth.feet).reshape(-1, 2),
         float(np.mean(truth.doubts)) if truth.doubts else 0.0,
         robot.body[0],
         robot.verdict,
@@ -170,15 +155,12 @@ def verdicts(walk: Walk) -> tuple[int, int]:
     anchored: np.ndarray = np.any(loaded & (walk.speed < MOVING), axis=1)
     right = total = 0
     for leg in range(loaded.shape[1]):
-        change = np.diff(loaded[:, leg].astype(int))
-        starts, ends = np.flatnonzero(change > 0) + 1, np.flatnonzero(change < 0)
-        for end in ends[walk.stamps[ends] > BEGINS]:
-            before = starts[starts <= end]
-            if not len(before) or not walk.flat[end, leg]:
+        for start, stop in runs(loaded[:, leg]):
+            end = stop - 1
+            if not start or stop == len(loaded) or walk.stamps[end] <= BEGINS:
                 continue
-            stance = slice(int(before[-1]), int(end) + 1)
-            # Shorter ones are bounces.
-            if (end - before[-1]) * walk.period < 0.1 or anchored[stance].mean() < STICKS:
+            short = (end - start) * walk.period < 0.1  # a bounce
+            if not walk.flat[end, leg] or short or anchored[start:stop].mean() < STICKS:
                 continue
             total += 1
             right += bool((walk.probability[end, leg] > 0.5) == walk.wet[end, leg])
@@ -194,9 +176,6 @@ def summary(walks: Sequence[Walk]) -> dict[str, Any]:
         found = verdicts(walk)
         right, total = right + found[0], total + found[1]
     delays = [each for each in tally.delays if math.isfinite(each)]
-    errors = {
-        name: np.concatenate([getattr(walk, name) for walk in walks]) for name in ('body', 'feet')
-    }
     figures: dict[str, Any] = {
         'distance_m': [walk.distance for walk in walks],
         'ended_early': [walk.verdict for walk in walks if walk.verdict],
@@ -209,10 +188,10 @@ def summary(walks: Sequence[Walk]) -> dict[str, Any]:
         'false_alarms': tally.false_alarms,
         'doubt': float(np.mean([walk.doubt for walk in walks])),
     }
-    for name, rows in errors.items():
-        if len(rows):
-            figures[f'{name}_rmse_m_s'] = float(np.sqrt(np.mean(rows[:, 0] ** 2)))
-            figures[f'{name}_coverage'] = float(np.mean(np.abs(rows[:, 0]) < 2.0 * rows[:, 1]))
+    rows = np.concatenate([walk.body for walk in walks])
+    if len(rows):
+        figures['body_rmse_m_s'] = float(np.sqrt(np.mean(rows[:, 0] ** 2)))
+        figures['body_coverage'] = float(np.mean(np.abs(rows[:, 0]) < 2.0 * rows[:, 1]))
     return figures
 
 

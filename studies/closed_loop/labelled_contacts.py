@@ -23,7 +23,6 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy import optimize, special
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
@@ -46,9 +45,6 @@ GATE = Tuning().load_gate
 LABEL_RATE = 0.08
 """Angular rate above which most samples are labelled slip, rad/s; found in the data."""
 
-EDGE_TIME = 0.1
-"""Time after touch-down, and before lift-off, that is counted separately, s."""
-
 FALSE_PER_MINUTE = 1.0
 """Allowed number of false alarms per minute of quiet samples (``Recording.quiet``)."""
 
@@ -62,23 +58,11 @@ SAME = 0.02
 FEWEST = 10
 """Smallest number of slips for which a share is given."""
 
-POINT = 1e-4
-"""Yaw moment over load below which a foot counts as standing on a point, m."""
-
-LEAST = 1e-6
-"""Least value in logarithms and denominators, so that a reading of zero gives a finite value."""
-
 RATIO, TWIST, RATE, CUSUM, SHAKE = (
     'T/N', 'T/N with M_z', 'rate', 'CUSUM of rim speed', 'acceleration',
 )  # fmt: skip
-BOTH, CHANNELS, SHARES = 'T/N and rate', '12 channels', '12 channels / largest'
-AXES = tuple(f'{kind} {axis}' for kind in ('force', 'moment', SHAKE, 'rate') for axis in 'xyz')
-FITTED = {BOTH: (RATIO, RATE), CHANNELS: AXES, SHARES: tuple(f'{name} / largest' for name in AXES)}
-"""Features that a logistic fit combines."""
-
-RANKED = (RATIO, TWIST, RATE, CUSUM, SHAKE, BOTH, CHANNELS)
-ALARMED = (RATIO, RATE, CUSUM, SHAKE, BOTH, CHANNELS, SHARES)
-CALIBRATED = (RATIO, TWIST, RATE, SHAKE, BOTH, CHANNELS, SHARES)
+RANKED = (RATIO, TWIST, RATE, CUSUM, SHAKE)
+ALARMED = (RATIO, RATE, CUSUM, SHAKE)
 
 
 # --- recordings ----------------------------------------------------------------------------------
@@ -96,8 +80,6 @@ class Recording:
         N, N m, m/s², rad/s.
     label : ndarray of int, shape (n,)
         ``STABLE``, ``NONE`` or ``SLIP``.
-    period : float
-        Sampling period, s.
     """
 
     name: str
@@ -106,7 +88,6 @@ class Recording:
     acceleration: np.ndarray
     rate: np.ndarray
     label: np.ndarray
-    period: float = PERIOD
 
     @property
     def robot(self) -> str:
@@ -170,12 +151,6 @@ class Recording:
         return found
 
     @functools.cached_property
-    def at_friction(self) -> np.ndarray:
-        """Whether each sample is in stance, with T/N equal to the friction of a floor."""
-        near = [np.abs(self.ratio - floor) < SAME * floor for floor in self.floors]
-        return self.standing & np.any(near, axis=0)
-
-    @functools.cached_property
     def centre(self) -> np.ndarray:
         """Centre of pressure, shape (n, 2), m, assuming that forces are measured at sole level."""
         return np.column_stack(
@@ -202,19 +177,19 @@ class Recording:
     @functools.cached_property
     def quiet(self) -> np.ndarray:
         """Whether each sample is stable, in stance, and :data:`CLEAR` away from labelled slips."""
-        reach = round(CLEAR / self.period)
+        reach = round(CLEAR / PERIOD)
         near = np.convolve(self.label == SLIP, np.ones(2 * reach + 1), 'same') > 0.5
         return self.sticking & ~near
 
     @property
     def quiet_minutes(self) -> float:
         """Total time of the quiet samples, minutes."""
-        return float(self.quiet.sum()) * self.period / 60.0
+        return float(self.quiet.sum()) * PERIOD / 60.0
 
     @functools.cached_property
     def events(self) -> list[tuple[int, int]]:
         """Start and end (exclusive) of labelled slips in stance of at least :data:`SHORTEST`."""
-        shortest = round(SHORTEST / self.period)
+        shortest = round(SHORTEST / PERIOD)
         joined = runs(self.slipping, join=shortest - 1)
         return [(start, stop) for start, stop in joined if stop - start >= shortest]
 
@@ -237,7 +212,14 @@ def read(path: pathlib.Path) -> Recording:
         When the file is missing, has anything but 13 columns of finite numbers, has labels other
         than 0, 1 and 2, or has no stable contact or no slip in stance.
     """
-    table = number_table(path, 13, SOURCE)
+    if not path.is_file():
+        raise InvalidInput(f'{path}: no such file; fetch it from {SOURCE}')
+    try:
+        table = np.genfromtxt(path, delimiter=',', ndmin=2)
+    except ValueError as error:
+        raise InvalidInput(f'{path}: {error}; 13 columns of numbers are needed') from error
+    if table.shape[1] != 13:
+        raise InvalidInput(f'{path} has shape {table.shape}: 13 columns are needed')
     if not np.isfinite(table).all() or not np.isin(table[:, 12], (STABLE, NONE, SLIP)).all():
         raise InvalidInput(
             f'{path}: 13 columns of finite numbers are needed, the last one (labels'
@@ -253,48 +235,19 @@ def read(path: pathlib.Path) -> Recording:
     return found
 
 
-def number_table(path: pathlib.Path, columns: int, source: str) -> np.ndarray:
-    """Return the numbers of a file, NaN where a field is empty.
-
-    Raises
-    ------
-    InvalidInput
-        When the file is missing or has another number of columns.
-    """
-    if not path.is_file():
-        raise InvalidInput(f'{path}: no such file; fetch it from {source}')
-    try:
-        table = np.genfromtxt(path, delimiter=',', ndmin=2)
-    except ValueError as error:
-        raise InvalidInput(f'{path}: {error}; {columns} columns of numbers are needed') from error
-    if table.shape[1] != columns:
-        raise InvalidInput(f'{path} has shape {table.shape}: {columns} columns are needed')
-    return table
-
-
 # --- features ------------------------------------------------------------------------------------
 
 
 def features(recording: Recording) -> dict[str, np.ndarray]:
-    """Return each feature by sample; a larger value makes slip more likely.
-
-    The features of one channel (:data:`AXES`) are magnitudes. Rate and acceleration are decimal
-    logarithms.
-    """
-    channels = np.column_stack(
-        [recording.force, recording.moment, recording.acceleration, recording.rate]
-    )
-    found = dict(zip(AXES, np.abs(channels).T, strict=True))
-    found |= {f'{name} / largest': row / max(row.max(), LEAST) for name, row in found.items()}
-    shaken = np.linalg.norm(recording.acceleration, axis=1)
+    """Return each feature by sample; a larger value makes slip more likely."""
     lever = 2.0 / 3.0 * recording.sole_radius
-    return found | {
+    return {
         RATIO: recording.ratio,
         # The ellipsoidal limit surface with the torsional limit 2/3 R μ N of a disc.
         TWIST: np.hypot(recording.ratio, 1.5 * recording.torsion / recording.sole_radius),
-        RATE: np.log10(np.maximum(recording.speed, LEAST)),
+        RATE: recording.speed,
         CUSUM: cusum(recording, lever * recording.speed),
-        SHAKE: np.log10(np.maximum(shaken, LEAST)),
+        SHAKE: np.linalg.norm(recording.acceleration, axis=1),
     }
 
 
@@ -310,7 +263,7 @@ def cusum(recording: Recording, speed: np.ndarray) -> np.ndarray:
     for start, stop in recording.stances:
         alarm.reset()
         for index in range(start, stop):
-            alarm.update(float(speed[index]), noise, recording.period)
+            alarm.update(float(speed[index]), noise, PERIOD)
             (statistic[index],) = alarm.statistics
     return statistic
 
@@ -324,7 +277,7 @@ def least_friction(recording: Recording) -> np.ndarray:
     prior = FrictionPrior.of(Foot.load('large37'), 6.8)
     ground = GroundFilter(GroundModel(FrictionScales(prior, learns=False)))
     noise = Tuning().ratio_noise
-    window = round(Tuning().filter_period / recording.period)
+    window = round(Tuning().filter_period / PERIOD)
     quantile = np.zeros(len(recording.label))
     for start, stop in recording.stances:
         ground.touch_down(math.inf, dome=False)
@@ -334,7 +287,7 @@ def least_friction(recording: Recording) -> np.ndarray:
             ratio = float(recording.ratio[first:end].mean())
             weight = -math.expm1(-0.5 * ((ratio - last) / noise) ** 2)
             last = ratio if math.isinf(last) else last + weight * (ratio - last)
-            duration = (end - first) * recording.period
+            duration = (end - first) * PERIOD
             ground.update(Evidence(ratio, noise, 0.0, 1.0, duration, weight))
             quantile[first:end] = ground.quantile(0.05)
     return quantile
@@ -367,181 +320,45 @@ def ranking(score: np.ndarray, recording: Recording, resamples: int = 200) -> di
     }
 
 
-# --- probability ---------------------------------------------------------------------------------
+# --- tables --------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Logistic:
-    """A logistic fit: probability 1/(1 + exp(-(intercept + slope · x)))."""
-
-    intercept: float
-    slope: np.ndarray
-
-    def log_odds(self, x: np.ndarray) -> np.ndarray:
-        """Return the log odds for rows of features, shape (n, k)."""
-        return self.intercept + x @ self.slope
-
-
-def fit(x: np.ndarray, slip: np.ndarray, ridge: float = 1e-4) -> Logistic:
-    """Return the logistic fit to rows of features, shape (n, k), and whether each slips.
-
-    A small penalty on the slope of standardised features makes the fit unique even where a
-    threshold separates all samples.
-    """
-    centre, spread = x.mean(axis=0), x.std(axis=0)
-    rows = np.column_stack([np.ones(len(x)), (x - centre) / np.where(spread > 0.0, spread, 1.0)])
-    penalty = np.r_[0.0, np.full(x.shape[1], ridge)]
-
-    def loss(weights: np.ndarray) -> tuple[float, np.ndarray]:
-        odds = rows @ weights
-        value = np.mean(np.logaddexp(0.0, odds) - slip * odds) + 0.5 * penalty @ weights**2
-        return value, rows.T @ (special.expit(odds) - slip) / len(x) + penalty * weights
-
-    weights = optimize.minimize(loss, np.zeros(rows.shape[1]), jac=True, method='BFGS').x
-    slope = weights[1:] / np.where(spread > 0.0, spread, 1.0)
-    return Logistic(float(weights[0] - slope @ centre), slope)
-
-
-def reliability(
-    probability: np.ndarray, slip: np.ndarray, bins: int = 10, least: int = 20
-) -> list[tuple[float, float, int]]:
-    """Return mean probability, share of slip and number of samples of each bin of probability.
-
-    Bins with fewer than ``least`` samples are left out.
-    """
-    place = np.minimum((probability * bins).astype(int), bins - 1)
-    masks = [place == index for index in range(bins)]
-    return [
-        (float(probability[mask].mean()), float(slip[mask].mean()), int(mask.sum()))
-        for mask in masks
-        if mask.sum() >= least
-    ]
-
-
-class Study:
-    """Recordings with their features, and logistic fits to the same robot and to other robots."""
-
-    def __init__(self, recordings: Sequence[Recording]) -> None:
-        self.recordings = list(recordings)
-        self.features = {
-            each.name: features(each) for each in command.each(self.recordings, 'features', 'file')
+def measure(recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Return the document with all tables, by recording."""
+    scores = {each.name: features(each) for each in command.each(recordings, 'features', 'file')}
+    found = {}
+    for each in command.each(recordings, 'tables', 'file'):
+        own = scores[each.name]
+        others = [other for other in recordings if other.robot != each.robot]
+        alarms: dict[str, Any] = {}
+        for name in ALARMED:
+            for word, teachers in (('own', [each]), ('other', others)):
+                taught = [scores[other.name][name] for other in teachers]
+                threshold = operating_threshold(taught, teachers)
+                alarms.setdefault(name, {})[word] = alarm_figures(own[name], threshold, each)
+        found[each.name] = {
+            'labels': labels(each),
+            'ranking': {name: ranking(own[name], each) for name in RANKED},
+            'alarm': alarms,
         }
-
-    def others(self, recording: Recording) -> list[Recording]:
-        """Return the recordings of other robots."""
-        return [each for each in self.recordings if each.robot != recording.robot]
-
-    def columns(self, recording: Recording, name: str) -> np.ndarray:
-        """Return samples by the features that a detector uses."""
-        found = self.features[recording.name]
-        return np.column_stack([found[each] for each in FITTED.get(name, (name,))])
-
-    def fitted(self, name: str, parts: Sequence[tuple[Recording, slice]]) -> Logistic:
-        """Return the fit to samples of parts of recordings that are in stance and have contact."""
-        x, slip = [], []
-        for recording, part in parts:
-            use = recording.standing[part] & (recording.label[part] != NONE)
-            x.append(self.columns(recording, name)[part][use])
-            slip.append(recording.slipping[part][use])
-        return fit(np.concatenate(x), np.concatenate(slip))
-
-    @functools.cache  # noqa: B019 - a process makes only one study
-    def log_odds(self, recording: Recording, name: str, own: bool) -> np.ndarray:
-        """Return the log odds of slip by sample.
-
-        If ``own``, each half of the recording gets the fit to its other half; otherwise all of the
-        recording gets the fit to all other robots. Halves of the slips end with a stance.
-        """
-        x = self.columns(recording, name)
-        if not own:
-            whole = [(each, slice(None)) for each in self.others(recording)]
-            return self.fitted(name, whole).log_odds(x)
-        slips = np.flatnonzero(recording.slipping)
-        half = next(end for start, end in recording.stances if end > slips[len(slips) // 2])
-        early, late = slice(half), slice(half, None)
-        return np.concatenate(
-            [
-                self.fitted(name, [(recording, late)]).log_odds(x[early]),
-                self.fitted(name, [(recording, early)]).log_odds(x[late]),
-            ]
-        )
-
-    def score(self, recording: Recording, name: str, own: bool) -> np.ndarray:
-        """Return the quantity that an alarm compares with its threshold, by sample."""
-        if name in FITTED:
-            return self.log_odds(recording, name, own)
-        return self.features[recording.name][name]
-
-    def alarm(self, recording: Recording, name: str) -> dict[str, Any]:
-        """Return figures of an alarm, with the threshold of this recording and of other robots."""
-        found = {}
-        for word, own in (('own', True), ('other', False)):
-            teachers = [recording] if own else self.others(recording)
-            scores = [self.score(each, name, own=True) for each in teachers]
-            threshold = operating_threshold(scores, teachers)
-            found[word] = alarm_figures(self.score(recording, name, own), threshold, recording)
-        return found
-
-    def calibration(self, recording: Recording, name: str) -> dict[str, Any]:
-        """Return the accuracy of the probability of slip, fitted to this robot and to others."""
-        use = recording.slipping | recording.sticking
-        slip = recording.slipping[use]
-        share = float(slip.mean())
-        found: dict[str, Any] = {'share': share, 'brier_of_share': share * (1.0 - share)}
-        for word, own in (('own', True), ('other', False)):
-            probability = special.expit(self.log_odds(recording, name, own)[use])
-            found[word] = {
-                'brier': float(np.mean((probability - slip) ** 2)),
-                'accuracy': float(np.mean((probability > 0.5) == slip)),
-                'reliability': reliability(probability, slip),
-            }
-        return found
-
-    def run(self) -> dict[str, Any]:
-        """Return the document with all tables, by recording."""
-        document: dict[str, Any] = {
-            'source': SOURCE, 'gate': GATE, 'false_per_minute': FALSE_PER_MINUTE,
-            'label_rate_rad_s': LABEL_RATE, 'recordings': {},
-        }  # fmt: skip
-        for each in command.each(self.recordings, 'tables', 'file'):
-            document['recordings'][each.name] = {
-                'labels': labels(each),
-                'ranking': {name: ranking(self.score(each, name, True), each) for name in RANKED},
-                'alarm': {name: self.alarm(each, name) for name in ALARMED},
-                'calibration': {name: self.calibration(each, name) for name in CALIBRATED},
-            }
-        return document
+    return {
+        'source': SOURCE, 'gate': GATE, 'false_per_minute': FALSE_PER_MINUTE, 'recordings': found,
+    }  # fmt: skip
 
 
 def labels(recording: Recording) -> dict[str, Any]:
-    """Return how labels, forces and rates of a recording are related."""
-    at_edge = np.zeros(len(recording.label), dtype=bool)
-    edge = math.ceil(EDGE_TIME / recording.period)
-    for start, stop in recording.stances:
-        at_edge[start : min(start + edge, stop)] = True
-        at_edge[max(start, stop - edge) : stop] = True
+    """Return how many labels there are, and how the friction of the floor is estimated."""
     ends = [stop - 1 for _, stop in recording.stances]
-    quantile = least_friction(recording)[ends]
-    found: dict[str, Any] = {
+    one = recording.floors[0] if len(recording.floors) == 1 else None
+    below = None if one is None else float(np.mean(least_friction(recording)[ends] > one))
+    return {
         'samples': len(recording.label),
         'stances': len(recording.stances),
         'slips': int(recording.slipping.sum()),
         'expected_load_N': recording.expected_load,
-        'slip_below_gate': float(np.mean(~recording.standing[recording.label == SLIP])),
         'floors': recording.floors,
+        'friction_below_quantile': below,
     }
-    marks = {
-        'at_friction': recording.at_friction,
-        'above_label_rate': recording.speed > LABEL_RATE,
-        'at_edge': at_edge,
-        'on_a_point': np.abs(recording.torsion) < POINT,
-    }
-    for name, mark in marks.items():
-        found[f'slip_{name}'] = float(np.mean(mark[recording.slipping]))
-        found[f'stick_{name}'] = float(np.mean(mark[recording.sticking]))
-    one = recording.floors[0] if len(recording.floors) == 1 else None
-    below = None if one is None else float(np.mean(quantile > one))
-    return found | {'friction_below_quantile': below}
 
 
 # --- alarms --------------------------------------------------------------------------------------
@@ -569,20 +386,18 @@ def operating_threshold(scores: Sequence[np.ndarray], recordings: Sequence[Recor
     return chosen
 
 
-def alarm_figures(
-    score: np.ndarray, threshold: float, recording: Recording, fewest: int = FEWEST
-) -> dict[str, Any]:
+def alarm_figures(score: np.ndarray, threshold: float, recording: Recording) -> dict[str, Any]:
     """Return misses, median delay and false alarms of a threshold.
 
-    The share of misses is None for fewer than ``fewest`` slips.
+    The share of misses is None for fewer than :data:`FEWEST` slips.
     """
     slips = recording.events
     above = [np.flatnonzero(score[start:stop] > threshold) for start, stop in slips]
-    delays = [float(each[0]) * recording.period for each in above if len(each)]
+    delays = [float(each[0]) * PERIOD for each in above if len(each)]
     return {
         'threshold': threshold,
         'events': len(slips),
-        'missed': 1.0 - len(delays) / len(slips) if len(slips) >= fewest else None,
+        'missed': 1.0 - len(delays) / len(slips) if len(slips) >= FEWEST else None,
         'delay_s': float(np.median(delays)) if delays else None,
         'false_per_minute': false_alarms(score, threshold, recording) / recording.quiet_minutes,
     }
@@ -592,10 +407,10 @@ def alarm_figures(
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return labels, ranking, alarms and probabilities as text."""
+    """Return labels, ranking and alarms as text."""
     found = document['recordings']
     lines = [command.listed([{'file': name, **row['labels']} for name, row in found.items()])]
-    for part in ('ranking', 'alarm', 'calibration'):
+    for part in ('ranking', 'alarm'):
         rows = [
             {'file': name, part: score, **row}
             for name, parts in found.items()
@@ -608,17 +423,16 @@ def table(document: dict[str, Any]) -> str:
 COLOURS = (SKY, BLUE, GREEN, ORANGE, VERMILION, PURPLE, BLACK)
 
 
-def draw(study: Study, document: dict[str, Any]) -> Figure:
-    """Return the picture: ranking, T/N, angular rate and calibration."""
+def draw(recordings: Sequence[Recording], document: dict[str, Any]) -> Figure:
+    """Return the picture: ranking, T/N and angular rate."""
     rows = document['recordings']
     colours = dict(zip(rows, COLOURS, strict=False))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 8.0), layout='constrained')
-        a, b, c, d = figure.subplots(2, 2).ravel()
+        figure = Figure(figsize=(13.0, 4.0), layout='constrained')
+        a, b, c = figure.subplots(1, 3)
         _draw_ranking(a, rows, colours)
-        _draw_ratio(b, max(study.recordings, key=lambda each: len(each.floors)))
-        _draw_rate(c, study.recordings, colours)
-        _draw_reliability(d, rows, colours)
+        _draw_ratio(b, max(recordings, key=lambda each: len(each.floors)))
+        _draw_rate(c, recordings, colours)
     return figure
 
 
@@ -671,19 +485,6 @@ def _draw_rate(panel: Axes, recordings: Sequence[Recording], colours: dict[str, 
     )  # fmt: skip
 
 
-def _draw_reliability(panel: Axes, rows: dict[str, Any], colours: dict[str, str]) -> None:
-    panel.plot([0.0, 1.0], [0.0, 1.0], color=BLACK, lw=0.9, ls='--')
-    for name, row in rows.items():
-        for word, style in (('own', '-'), ('other', ':')):
-            points = np.array(row['calibration'][RATE][word]['reliability'])
-            panel.plot(*points[:, :2].T, style, marker='o', ms=4.0, lw=1.3, color=colours[name])
-    panel.set(
-        xlim=(0.0, 1.0), ylim=(0.0, 1.0), xlabel='probability of slip from the angular rate',
-        ylabel='share labelled slip',
-        title='d  probability, fitted to its other half (solid), to the other robot (dotted)',
-    )  # fmt: skip
-
-
 def main(words: Sequence[str]) -> int:
     """Measure, print and draw."""
     parser = command.parser('labelled_contacts', __doc__)
@@ -698,12 +499,11 @@ def main(words: Sequence[str]) -> int:
             f'all files are of one robot, {recordings[0].robot} (the name up to the underscore):'
             f' files of two robots or more are needed; fetch them from {SOURCE}'
         )
-    study = Study(recordings)
     # More than five digits would not be significant.
     document = json.loads(
-        json.dumps(study.run()), parse_float=lambda text: float(f'{float(text):.5g}')
+        json.dumps(measure(recordings)), parse_float=lambda text: float(f'{float(text):.5g}')
     )
-    pictures = {'labelled_contacts': draw(study, document)}
+    pictures = {'labelled_contacts': draw(recordings, document)}
     kept = command.write(options.out, 'labelled_contacts', document, pictures)
     command.show(options, kept, table(document))
     return 0

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 import pathlib
 import resource
 import subprocess
@@ -23,11 +22,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ros_pad import configuration
-from ros_pad.configuration import refuse
 from ros_pad.contact import LARGE_PAD, film_thickness, force_limit, inflate
 from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
-from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import save
 from ros_pad.reports.pictures import draw_comparison
 from ros_pad.reports.style import STYLE, rendered
@@ -44,35 +41,17 @@ SCENE, SEED = 'hexapod_patches', 0
 RISE = 0.03  # s in which the load of a dome in mid-stance comes
 
 
-def lead_picture(
-    trials: Sequence[Trial], path: str | os.PathLike[str], force: bool = False
-) -> None:
+def lead_picture(trials: Sequence[Trial], path: pathlib.Path) -> None:
     """Draw where feet became domes, and beside this the distance a cycle by policy.
 
     Parameters
     ----------
     trials : sequence of Trial
-        One for each policy, of one scene and seed. The map shows the adaptive one, or else the
-        first.
-    path : path
-        PNG file to write, 1600 pixels wide.
-    force : bool
-        Replace an existing file.
-
-    Raises
-    ------
-    InvalidInput
-        Without trials, or when their scenes or seeds differ.
-    PadError
-        When the file exists or cannot be written.
+        One for each policy, of one scene and seed. The map shows the adaptive one.
+    path : Path
+        PNG file that is written, 1600 pixels wide.
     """
-    if len({(trial.scene, trial.seed) for trial in trials}) != 1:
-        raise InvalidInput(
-            f'trials = {[(trial.scene, trial.seed) for trial in trials]} (scene, seed) are not'
-            ' allowed: one or more are needed, all of one scene and seed'
-        )
-    refuse(path, force)
-    drawn = next((trial for trial in trials if trial.policy == 'adaptive'), trials[0])
+    drawn = next(trial for trial in trials if trial.policy == 'adaptive')
     view = view_of(drawn, [trial for trial in trials if trial is not drawn])
     rows = max(2, walk_map.rows_of(drawn))
     wide, map_width = 16.0, 9.7
@@ -169,7 +148,7 @@ def main(words: Sequence[str]) -> int:
         subprocess.run([pad, 'run', SCENE], cwd=folder, stdout=quiet, stderr=quiet, check=True)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     processor_s = used.ru_utime + used.ru_stime
-    lead_picture(trials, options.out / f'{SCENE}.png', force=True)
+    lead_picture(trials, options.out / f'{SCENE}.png')
     document = command.write(options.out, 'readme', figures(trials, processor_s))
     command.show(options, document, json.dumps(document, indent=1))
     return 0

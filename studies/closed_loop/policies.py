@@ -33,6 +33,7 @@ from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop import loops, rivals
 from studies.drawing import BLACK, BLUE, GREEN, STYLE
+from studies.samples import bootstrap
 
 BETTER = 'better fixed shape'
 SCENE = 'hexapod_patches'
@@ -102,7 +103,7 @@ RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
 
 POLICIES = ('flat', 'dome', 'adaptive', *RIVALS, 'oracle')
 PAGE = command.ROOT / 'docs' / 'model' / 'policies.md'
-BEGIN, END = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
+MARKS = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
 MAIN = ('flat', 'dome', 'adaptive', 'each 8 steps', 'oracle')
 
 
@@ -181,12 +182,11 @@ def ratio(distances: Sequence[float], others: Sequence[float]) -> dict[str, floa
     no progress on some floor.)
     """
     ours, theirs = np.array(distances), np.array(others)
-    drawn = np.random.default_rng(0).integers(len(ours), size=(10_000, len(ours)))
-    low, high = np.percentile(ours[drawn].mean(axis=1) / theirs[drawn].mean(axis=1), (2.5, 97.5))
+    low, high = bootstrap(list(zip(distances, others, strict=True)), 10_000)
     return {
         'of_means': round(float(ours.mean() / theirs.mean()), 4),
-        'low': round(float(low), 4),
-        'high': round(float(high), 4),
+        'low': round(low, 4),
+        'high': round(high, 4),
         'least': round(float((ours / theirs).min()), 4),
         'behind': round(float((ours < 0.995 * theirs).mean()), 3),
     }
@@ -333,12 +333,6 @@ def overall(document: Mapping[str, Any]) -> str:
     return '\n'.join(lines)
 
 
-def written(page: str, tables: str) -> str:
-    """Return docs/model/policies.md with its table replaced."""
-    before, rest = page.split(BEGIN)
-    return f'{before}{BEGIN}\n{tables}\n{END}{rest.split(END)[1]}'
-
-
 # --- picture -------------------------------------------------------------------------------------
 
 _LOOKS = ((BETTER, GREEN, -0.15), ('oracle', BLUE, 0.15))
@@ -346,66 +340,47 @@ _PARTS = {'held out': 'held out', 'against': 'little to win, or file wrong'}
 
 
 def draw(document: Mapping[str, Any]) -> Figure:
-    """Draw the adaptive policy against every other, and ground by ground.
+    """Draw the adaptive policy against the better fixed shape and the oracle, ground by ground.
 
     Grounds in :data:`TUNED_ON` are hollow.
     """
     with rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 6.0), layout='constrained')
-        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.35))
-        whole = document['held out']['all']
-        pairs = [(name, row['adaptive to it']) for name, row in whole['ratios'].items()]
-        pairs = [(BETTER, whole['ratios']['adaptive'][BETTER]), *pairs]
-        pairs = [pair for pair in pairs if pair[0] != 'adaptive']
-        pairs.sort(key=lambda pair: -pair[1]['of_means'])
-        for place, (_, row) in enumerate(pairs):
-            _ratio(left, place, row, BLACK)
-        _finish(left, [name for name, _ in pairs])
-        left.set_title(f'adaptive to others, {len(whole["flat"]["seeds"])} held-out floors')
-        _by_ground(right, document)
+        figure = Figure(figsize=(6.4, 6.0), layout='constrained')
+        panel = figure.subplots()
+        names: list[str] = []
+        heads = []
+        for part, heading in _PARTS.items():
+            heads.append(len(names))
+            names.append(heading)
+            for name, row in document[part]['grounds'].items():
+                for other, colour, shift in _LOOKS:
+                    ratio = row['ratios']['adaptive'][other]
+                    _ratio(panel, len(names) + shift, ratio, colour, name in TUNED_ON)
+                names.append(f'{name} ({len(row["flat"]["seeds"])})')
+        panel.axvline(1.0, color='0.6', linewidth=0.8, zorder=0)
+        panel.set_yticks(range(len(names)), names)
+        for head in heads:
+            panel.get_yticklabels()[head].set_fontweight('bold')
+        panel.tick_params(axis='y', length=0)
+        panel.set(
+            ylim=(len(names) - 0.5, -0.5), xlabel='ratio of mean distances, 95 % interval',
+            title='adaptive, by ground (floors; one floor has no interval)',
+        )  # fmt: skip
         handles = [
             Line2D([], [], color=colour, marker='o', ms=4, label=f'to the {name}')
             for name, colour, _ in _LOOKS
         ]
         hollow = Line2D([], [], color=BLACK, marker='o', ls='', ms=4, mfc='white')
         hollow.set_label('tuned on')
-        handles.append(hollow)
-        figure.legend(handles=handles, loc='outside lower right', ncols=3)
+        figure.legend(handles=[*handles, hollow], loc='outside lower right', ncols=3)
     return figure
 
 
-def _by_ground(panel: Axes, document: Mapping[str, Any]) -> None:
-    names: list[str] = []
-    heads = []
-    for part, heading in _PARTS.items():
-        heads.append(len(names))
-        names.append(heading)
-        for name, row in document[part]['grounds'].items():
-            for other, colour, shift in _LOOKS:
-                ratio = row['ratios']['adaptive'][other]
-                _ratio(panel, len(names) + shift, ratio, colour, name in TUNED_ON)
-            names.append(f'{name} ({len(row["flat"]["seeds"])})')
-    _finish(panel, names)
-    for head in heads:
-        panel.get_yticklabels()[head].set_fontweight('bold')
-    panel.set_title('adaptive, by ground (floors; one floor has no interval)', loc='right')
-
-
-def _ratio(
-    panel: Axes, place: float, row: Mapping[str, float], colour: str, hollow: bool = False
-) -> None:
+def _ratio(panel: Axes, place: float, row: Mapping[str, float], colour: str, hollow: bool) -> None:
     """Draw a ratio and its interval, which has no length where there is one floor."""
     panel.plot([row['low'], row['high']], [place, place], color=colour, lw=1.2)
     face = 'white' if hollow else colour
     panel.plot(row['of_means'], place, 'o', color=colour, mfc=face, ms=4)
-
-
-def _finish(panel: Axes, names: list[str]) -> None:
-    panel.axvline(1.0, color='0.6', linewidth=0.8, zorder=0)
-    panel.set_yticks(range(len(names)), names)
-    panel.tick_params(axis='y', length=0)
-    panel.set_ylim(len(names) - 0.5, -0.5)
-    panel.set_xlabel('ratio of mean distances, 95 % interval')
 
 
 def main(words: Sequence[str]) -> int:
@@ -431,6 +406,6 @@ def main(words: Sequence[str]) -> int:
     document = measure(*given)
     document = command.write(options.out, 'policies', document, {'policies': draw(document)})
     if options.out == command.CHARTS:
-        PAGE.write_text(written(PAGE.read_text(), overall(document)))
+        PAGE.write_text(command.pasted(PAGE.read_text(), MARKS, overall(document)))
     command.show(options, document, overall(document))
     return 0

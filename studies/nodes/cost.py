@@ -46,6 +46,7 @@ Result = dict[str, dict[str, dict[str, float]]]
 """Medians by part, checkout and quantity."""
 
 WARM_UP = 8.0  # s, until all nodes have found one another
+LONGEST = 60.0  # s, until the recorder has started, however slow the machine
 _HERE = pathlib.Path(__file__).resolve().parents[2]
 
 # Runs in either checkout.
@@ -100,9 +101,12 @@ def _walk(checkout: pathlib.Path, out: pathlib.Path, *words: object) -> dict[str
 
 
 def _shares(
-    commands: dict[str, list[str]], checkout: pathlib.Path, seconds: float
+    commands: dict[str, list[str]], checkout: pathlib.Path, bag: pathlib.Path, seconds: float
 ) -> dict[str, float]:
-    """Run processes; return the processor time of each, s/s, and the memory of all, MB."""
+    """Run processes; return the processor time of each, s/s, and the memory of all, MB.
+
+    Time counts from some seconds after there is a bag.
+    """
     processes = {
         name: subprocess.Popen(
             words, cwd=checkout, env=_environment(checkout), stderr=subprocess.DEVNULL
@@ -110,6 +114,9 @@ def _shares(
         for name, words in commands.items()
     }
     try:
+        end = time.monotonic() + LONGEST
+        while not (bag / 'metadata.yaml').exists() and time.monotonic() < end:
+            time.sleep(0.1)
         time.sleep(WARM_UP)
         before = {name: processor_time(each.pid) for name, each in processes.items()}
         started = time.monotonic()
@@ -130,20 +137,17 @@ def _shares(
                 each.kill()
 
 
-def _live(
-    checkout: pathlib.Path, bag: pathlib.Path, seconds: float, rate: float
-) -> dict[str, float]:
+def _live(checkout: pathlib.Path, bag: pathlib.Path, seconds: float) -> dict[str, float]:
     """Return the processor time a sample, ms, of all nodes and of each, memory, and the rate."""
-    own = {'recorder': f'folder:={bag}', 'simulator': f'rate:={rate}'}
     commands = {
         node: [
             *(_python(checkout), '-m', f'ros_pad.nodes.{node}', '--ros-args'),
             *('--params-file', os.fspath(checkout / 'config' / 'params.yaml')),
-            *(('-p', own[node]) if node in own else ()),
+            *(('-p', f'folder:={bag}') if node == 'recorder' else ()),
         ]
         for node in NODES
     }
-    shares = _shares(commands, checkout, seconds)
+    shares = _shares(commands, checkout, bag, seconds)
     reached = float(_printed(_HERE, '-c', _RATE, bag, seconds))
     each = {node: 1e3 * shares[node] / reached for node in NODES}
     return {A_SAMPLE: sum(each.values()), **each, RATE: reached, MEMORY: shares[MEMORY]}
@@ -155,7 +159,7 @@ def _measured(
     """Return the quantities of a part; ``folder`` is an empty one that a checkout keeps."""
     if part == 'live':
         with tempfile.TemporaryDirectory(dir=folder) as own:
-            return _live(checkout, pathlib.Path(own) / 'bag', options.seconds, options.rate)
+            return _live(checkout, pathlib.Path(own) / 'bag', options.seconds)
     short = part == 'loop'
     words = ['--cycles', max(1, options.cycles // 3) if short else options.cycles]
     with tempfile.TemporaryDirectory(dir=folder) as own:
@@ -224,9 +228,6 @@ def main(words: Sequence[str]) -> int:
     )
     command.add_count(parser, '--repeats', 5, 'measurements of each part')
     command.add_count(parser, '--cycles', 60, 'gait cycles of the walk')
-    parser.add_argument(
-        '--rate', type=float, default=250.0, help='samples a second, live, Hz (default: 250)'
-    )
     parser.add_argument('--seconds', type=float, default=10.0, help='live time, s (default: 10)')
     command.add_out(parser)
     options = parser.parse_args(words)

@@ -20,7 +20,6 @@ COLOURS = {
     'invariant': PURPLE,
     'invariant, χ²': SKY,
     'odometry': ORANGE,
-    'odometry, r = 0': BLACK,
 }
 FLIGHTS = 0.05, 0.4  # s, times in which a gait may have no foot on the ground
 MARKERS = {'dry': 'o', 'patches': 's', 'ice': '^', 'hexapod': 'D'}

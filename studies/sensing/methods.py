@@ -17,10 +17,7 @@ from studies.samples import Flags
 from studies.sensing import rivals
 from studies.sensing.walks import Course, Log
 
-METHODS = (
-    *('estimator', 'no rejection', 'invariant', 'invariant, χ²'),
-    *('odometry', 'odometry, r = 0'),
-)
+METHODS = ('estimator', 'no rejection', 'invariant', 'invariant, χ²', 'odometry')
 
 
 class Track(NamedTuple):
@@ -94,8 +91,7 @@ def track_of(robot: Robot, log: Log, course: Course, method: str) -> Track:
     if method in rivals.FILTERS:
         rows = rivals.FILTERS[method](robot, course).rows(log)
     else:
-        radius = robot.foot_radius if method == 'odometry' else 0.0
-        rows = rivals.odometry(robot, log, course, radius)
+        rows = rivals.odometry(robot, log, course)
     seconds = (time.process_time() - begin) / len(rows)
     stands = rivals.loads_of(robot, log)
     none = np.full(stands.shape, math.nan)

@@ -44,11 +44,10 @@ class _Feet:
         return np.asarray((moving - radius * cross(self.turning + rate, up)) @ turn.T)
 
 
-def odometry(robot: Robot, log: Log, course: Course, radius: float) -> Rows:
+def odometry(robot: Robot, log: Log, course: Course) -> Rows:
     """Return legged odometry: heading and tilt from the gyro, speed from the feet that stand.
 
-    Rows have position and velocity of the base, and slip velocities of the feet. ``radius``, m, is
-    that with which the feet roll.
+    Rows have position and velocity of the base, and slip velocities of the feet.
     """
     bias = log.gyro[: round(1.8 * course.rate)].mean(0)
     turn, position, held = np.eye(3), np.zeros(3), np.zeros(3)
@@ -58,7 +57,7 @@ def odometry(robot: Robot, log: Log, course: Course, radius: float) -> Rows:
     ):
         rate = robot.imu[:3, :3] @ (gyro - bias)
         turn = turn @ rotation(rate / course.rate)
-        slips = _Feet(robot, np.eye(4), q, dq).slips(turn, rate, radius)
+        slips = _Feet(robot, np.eye(4), q, dq).slips(turn, rate, robot.foot_radius)
         held = -slips[stands].mean(0) if stands.any() else held
         position = position + held / course.rate
         rows.append((position, held, held + slips))

@@ -20,10 +20,9 @@ from ros_pad.robots.rotation import Array, cross, matrix
 from ros_pad.sensing.body_filter import GRAVITY
 from studies import command
 from studies.sensing import rivals
-from studies.sensing.methods import Track, track_of
+from studies.sensing.methods import METHODS, Track, track_of
 from studies.sensing.walks import REST, Course, Log, walk
 
-METHODS = ('estimator', 'no rejection', 'invariant', 'invariant, χ²', 'odometry')
 LIMIT = 0.1  # m/s, error of velocity x y above which a method has diverged: a third of the speed
 SPEED = 0.2  # m/s, of feet that slide
 ONSET = 0.05  # s, until they have it

@@ -2,11 +2,10 @@
 """Body and feet estimated from IMU, joints and foot forces, on simulated walks with known truth.
 
 Beside the estimator: the same without rejection of slipping feet, an invariant filter with and
-without rejection, and legged odometry (gyro, and the mean velocity of the feet that stand) with
-feet that roll and with feet that do not. Errors are vectors of x and y. Slips are of settled
-stances, 24 ms after touch-down, faster than 10 mm/s; the alarm is that of ros_pad.estimation with
-a noise of 15 mm/s. A false alarm has no speed above 5 mm/s in its last 60 ms. With --all, walks
-that are harder: long pushes, slopes, other gaits and rates, soft feet, a cheap IMU; and where
+without rejection, and legged odometry (gyro, and the mean velocity of the feet that stand). Errors
+are vectors of x and y. Slips are of settled stances, 24 ms after touch-down, faster than 10 mm/s;
+the alarm is that of ros_pad.estimation with a noise of 15 mm/s. A false alarm has no speed above
+5 mm/s in its last 60 ms. With --all, walks that are harder: long pushes, a cheap IMU; and where
 methods diverge: all feet slip, no foot stands, feet slide for long, low rates. With --picture,
 sensing.json and sensing.png: time an update against errors; and of --all, sensing_stability.json
 and .png.

@@ -64,41 +64,16 @@ class Course:
         ``dry``, ``patches`` or ``ice``.
     push : float
         Length of a push of the trunk, s.
-    gait : str
-        Name of a gait; the robot's own where it is empty.
-    period, duty : float
-        Of that gait, s and share; those of the robot's own where they are 0.
-    lean : float
-        Shift of the body away from a foot that swings, over the distance of that foot.
-    pace : float
-        Factor on the robot's usual speed.
     rate : float
         Samples a second, Hz.
     noise : Noise
-    delay : float
-        Time by which joints and forces are later than the IMU, s; less than 20 ms.
     """
 
     robot: str = 'go2'
     floor: str = 'dry'
     push: float = 0.1
-    gait: str = ''
-    period: float = 0.0
-    duty: float = 0.0
-    lean: float = 0.0
-    pace: float = 1.0
     rate: float = RATE
     noise: Noise = field(default_factory=Noise)
-    delay: float = 0.0
-
-    def gait_of(self, robot: Robot) -> Gait:
-        """Return the gait in which a robot walks it."""
-        own = robot.gait
-        assert own is not None
-        period, duty = self.period or own.cycle, self.duty or own.duty
-        if not self.gait:
-            return Gait(period, duty, own.phases, own.lift)
-        return Gait.named(self.gait, robot.hips, period, duty, own.lift)
 
 
 @dataclass
@@ -197,22 +172,15 @@ class Floor:
         return float(self._values[row][column])
 
 
-def foot_targets(
-    gait: Gait, home: Array, velocity: Array, lean: float, time: float, size: float
-) -> Array:
+def foot_targets(gait: Gait, home: Array, velocity: Array, time: float, size: float) -> Array:
     """Return places of the feet in the base, (legs, 3), m, at a time of the gait, s.
 
-    ``velocity`` is that of the body over each foot, (legs, 2), m/s, ``lean`` as in
-    :class:`Course`, ``size`` a factor on all motion.
+    ``velocity`` is that of the body over each foot, (legs, 2), m/s, ``size`` a factor on motion.
     """
     phase = gait.phase(time)
     rest = np.maximum(phase - gait.duty, 0.0) / (1.0 - gait.duty)
     ahead = np.where(phase < gait.duty, 0.5 - phase / gait.duty, -0.5 * np.cos(np.pi * rest))
-    # The body leans away from feet that are about to swing, if they are on one side.
-    apart = np.abs((phase - 0.5 * gait.duty) % 1.0 - 0.5) / (1.0 - gait.duty)
-    aside = lean * np.cos(0.5 * np.pi * np.minimum(apart, 1.0)) ** 2
     feet = home.copy()
-    feet[:, :2] += size * aside @ home[:, :2]
     feet[:, :2] += (size * gait.duty * gait.cycle * ahead)[:, None] * velocity
     feet[:, 2] += size * gait.lift * np.sin(np.pi * rest) ** 2
     return feet
@@ -251,7 +219,8 @@ def walk(course: Course, seed: int, duration: float) -> Log:
     import mujoco
 
     robot, drive = Robot.load(course.robot), DRIVES[course.robot]
-    gait = course.gait_of(robot)
+    gait = robot.gait
+    assert gait is not None
     generator = np.random.default_rng(seed)
     ground = Floor(course.floor, generator)
     model: Any = mujoco.MjModel.from_xml_string(model_of(robot, course))
@@ -259,7 +228,7 @@ def walk(course: Course, seed: int, duration: float) -> Log:
     home = robot.foot_positions(robot.home)
     q = robot.joint_positions(home)
     # Feet that stand on the ground go backwards under the body.
-    velocity = np.tile((course.pace * drive.speed, 0.0), (len(home), 1))
+    velocity = np.tile((drive.speed, 0.0), (len(home), 1))
     aim = q.ravel()
     data.qpos[2] = -home[:, 2].mean() + (robot.foot_radius or POINT)
     data.qpos[7:] = data.ctrl[:] = aim
@@ -272,7 +241,7 @@ def walk(course: Course, seed: int, duration: float) -> Log:
         time = tick / course.rate
         if time > REST:
             size = min(1.0, (time - REST) / RAMP)
-            goal = foot_targets(gait, home, velocity, course.lean, time - REST, size)
+            goal = foot_targets(gait, home, velocity, time - REST, size)
             before, q = q, robot.joint_positions(goal, near=q)
             # Set-points lead by what servos need for their damping and for the robot's weight.
             stands = gait.stands(time - REST)
@@ -300,7 +269,7 @@ def walk(course: Course, seed: int, duration: float) -> Log:
         rows['accelerometer'].append(_specific_force(robot, model, rows, acceleration))
         rows['time'].append(time)
     log = Log(**{key: np.array(value) for key, value in rows.items()})
-    return _noisy(delayed(_levelled(log), course.delay), generator, course.noise)
+    return _noisy(_levelled(log), generator, course.noise)
 
 
 def _levelled(log: Log) -> Log:
@@ -311,17 +280,6 @@ def _levelled(log: Log) -> Log:
         setattr(log, name, getattr(log, name) @ level.T)
     log.slip = log.slip @ level[:2, :2].T
     log.orientation = np.array([quaternion(level @ matrix(turn)) for turn in log.orientation])
-    return log
-
-
-def delayed(log: Log, delay: float) -> Log:
-    """Return a log whose joints and forces come so much later, s, than they were measured."""
-    if delay:
-        for name in ('joint_positions', 'joint_velocities', 'foot_forces', 'efforts'):
-            values = getattr(log, name)
-            rows = values.reshape(len(values), -1).T
-            late = [np.interp(log.time - delay, log.time, row) for row in rows]
-            setattr(log, name, np.array(late).T.reshape(values.shape))
     return log
 
 
@@ -395,8 +353,6 @@ COURSES = {
     'ice': Course(floor='ice'),
     'hexapod': Course('ch3r', 'patches'),
     'long pushes, ice': Course(floor='ice', push=0.6),
-    'crawl': Course(floor='patches', gait='crawl', period=2.0, duty=0.85, lean=0.2, pace=0.3),
     'cheap IMU': Course(floor='patches', noise=HEAVY),
-    'hexapod, ripple': Course('ch3r', 'ice', push=0.3, gait='ripple', duty=0.7),
 }
 """The walks of the study; constants of the estimator were chosen on seeds below 101."""

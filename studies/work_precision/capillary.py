@@ -20,28 +20,16 @@ from scipy.integrate import solve_ivp, trapezoid
 from scipy.optimize import brentq
 from scipy.special import k0e, k1e
 
-from ros_pad.capillary import (
-    Mesh,
-    Wall,
-    Wet,
-    WetPattern,
-    WetSurface,
-    bath_meniscus,
-    wet,
-    wet_pattern,
-    wet_surface,
-)
+from ros_pad.capillary import Mesh, Wall, Wet, WetSurface, bath_meniscus, wet, wet_surface
 from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress
-from studies import command
 from studies.machine import spent_time
 from studies.work_precision import capillary_chart
 
 Pair = tuple[float, float]  # height, m, and force, N
 
-SPHERE, REST = 1.55e-3, 0.583e-3  # m: the dome of the reference table
 TENSIONS = (0.004, 0.073)  # N/m: the thesis' highest, and water
 RATIOS = (0.3, 0.5, 0.65, 0.8, 0.95)  # tension of the solid over tension of the liquid
 # The minimiser is slow, so it solves only these of the ten cases.
@@ -81,19 +69,19 @@ class Shape:
     solid: Callable[[float], float]
 
 
-def dome(top: float = 2.9e-3) -> Shape:
-    """Return the dome of the reference table, cut off at a height, m."""
-    centre = math.sqrt(SPHERE**2 - REST**2)
+def dome(sphere: float, rest: float, top: float) -> Shape:
+    """Return a dome with the radii of its sphere and its contact, cut off at a height, m."""
+    centre = math.sqrt((sphere - rest) * (sphere + rest))
 
     def solid(z: float) -> float:
-        return math.pi * (SPHERE**2 * z + ((centre - z) ** 3 - centre**3) / 3.0)
+        return math.pi * (sphere**2 * z + ((centre - z) ** 3 - centre**3) / 3.0)
 
     return Shape(
         'dome',
-        Wall.dome(SPHERE, REST, top),
-        lambda rings, sectors: Mesh.dome(SPHERE, REST, top, rings, sectors),
-        lambda r, z: math.hypot(r, z - centre) - SPHERE,
-        lambda z: math.acos((centre - z) / SPHERE),
+        Wall.dome(sphere, rest, top),
+        lambda rings, sectors: Mesh.dome(sphere, rest, top, rings, sectors),
+        lambda r, z: math.hypot(r, z - centre) - sphere,
+        lambda z: math.acos((centre - z) / sphere),
         solid,
     )
 
@@ -118,14 +106,14 @@ def cone(name: str, radius: float, degrees: float, top: float) -> Shape:
 
 
 SHAPES = (
-    dome(),
+    dome(1.55e-3, 0.583e-3, 2.9e-3),  # that of the reference table
     cone('truncated cone', 1.6e-3, 110.0, 3e-3),
     cone('cylinder', 1.2e-3, 90.0, 4e-3),
 )
 
 
 Row = SimpleNamespace
-"""Result of a method on a shape, ``kind`` is ``result``:
+"""Result of a method on a shape:
 
 - ``shape``, ``family``, ``size``: shape of the pad, family of the method, and its resolution
 - ``ms_per_solve``: median time of one case, milliseconds
@@ -134,31 +122,23 @@ Row = SimpleNamespace
 - ``refused``: cases in which liquid rises, and the method has no result
 - ``cases``: tension (N/m), ratio of tensions, height (m), force (N), those that are exact, and
   status; without a result, height and force are None, and the status is the reason
-
-Or an input that makes a method fail, ``kind`` is ``trap``: ``method``, ``given``, its ``answer``
-and the ``true`` one.
 """
 
 
 def measure(progress: Progress) -> list[Row]:
-    """Measure every method on every shape, the traps, and the traps.
-
-    Progress, 0 to 1, is reported to ``progress``.
-    """
+    """Measure every method on every shape; report progress, 0 to 1, to ``progress``."""
     rows: list[Row] = []
-    share = 0.9 / len(SHAPES)
+    share = 1.0 / len(SHAPES)
     _minimised(SHAPES[0], *MINIMISED[0])(WATER)  # imports are not timed
     for k, shape in enumerate(SHAPES):
         begin = k * share
         rows += run(shape, lambda done, begin=begin: progress(begin + share * done))  # type: ignore[misc]
-    rows += traps()
-    progress(1.0)
     return rows
 
 
 def figures(rows: list[Row], progress: Progress | None = None) -> dict[str, Figure]:
     """Return the picture, by name."""
-    return {'capillary': capillary_chart.draw([row for row in rows if row.kind == 'result'])}
+    return {'capillary': capillary_chart.draw(rows)}
 
 
 # --- truth ---------------------------------------------------------------------------------------
@@ -333,7 +313,6 @@ def result(
     good = errors(answers)
     heights, forces = [each[0] for each in good], [each[1] for each in good]
     return Row(
-        kind='result',
         shape=shape.name,
         family=family,
         size=size,
@@ -357,71 +336,3 @@ def errors(cases: Sequence[dict[str, Any]]) -> list[Pair]:
         for case in cases
         if case['height'] is not None and case['exact_height'] > 0.0
     ]  # fmt: skip
-
-
-# --- traps -----------------------------------------------------------------------------
-
-
-def traps() -> list[Row]:
-    """Return inputs that make methods fail, with the results of the methods and the true ones."""
-    round_, narrow, upright = SHAPES
-    meshes = {shape.name: shape.mesh(48, 72) for shape in SHAPES}
-    low = dome(1.1e-3)
-    hung = Liquid(0.073, 0.073, contact_angle=math.radians(100.0))
-    wetting = Liquid(0.073, 0.8 * 0.073)
-    flat = Liquid(0.073, 0.073, contact_angle=math.radians(75.0))
-
-    def outcome(solve: Callable[[], Any], shape: Shape = round_) -> str:
-        try:
-            found = solve()
-        except PadError as error:
-            return f'{type(error).__name__}: {error}'
-        if isinstance(found, WetPattern):
-            return f'{1e3 * found.height:.2f} mm' if found.status == 'ok' else found.status
-        pair, status = _read(shape, found)
-        return f'{1e3 * pair[0]:.2f} mm' if pair else status
-
-    def high(shape: Shape, liquid: Liquid) -> str:
-        height = truth(shape, liquid)[0]
-        return f'{1e3 * height:.2f} mm' if height else 'no rise'
-
-    def trap(method: str, given: str, answer: str, true: str) -> Row:
-        return Row(kind='trap', method=method, given=given, answer=answer, true=true)
-
-    rows = []
-    for balance in BALANCES:
-        answer = outcome(lambda b=balance: wet(meshes['dome'], hung, b))  # type: ignore[misc]
-        rows.append(trap(balance, 'dome, water, θ = 100°', answer, high(round_, hung)))
-    for balance in BALANCES:
-        for name, shape in (('truncated cone', narrow), ('cylinder', upright)):
-            answer = outcome(lambda b=balance, n=name: wet(meshes[n], wetting, b), shape)  # type: ignore[misc]
-            rows.append(trap(balance, f'{name}, water, γs/γl = 0.8', answer, high(shape, wetting)))
-    for balance in BALANCES:
-        answer = outcome(lambda b=balance: wet(low.mesh(48, 72), wetting, b))  # type: ignore[misc]
-        rows.append(trap(balance, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
-    answer = outcome(lambda: bath_meniscus(wall=low.wall, liquid=wetting))
-    rows.append(trap(EXACT, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
-    answer = outcome(lambda: wet_surface(low.wall, wetting, sectors=12, refinements=0))
-    rows.append(trap('minimised', 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
-    half, wide = dome(1.436e-3), Liquid(0.073, 0.7 * 0.073)
-    answer = outcome(lambda: wet(half.mesh(48, 72), wide, 'thesis'), half)
-    rows.append(trap('thesis', 'dome 1.44 mm high, water, γs/γl = 0.7', answer, high(half, wide)))
-    answer = outcome(lambda: wet(meshes['truncated cone'], flat), narrow)
-    rows.append(trap('energy', 'truncated cone, water, θ = 75°', answer, high(narrow, flat)))
-    thin = Liquid(0.001, 0.0003)
-    answer = outcome(lambda: wet(meshes['dome'], thin, layers=10))
-    rows.append(trap('energy', 'dome, 1 mN/m, γs/γl = 0.3, 10 layers', answer, high(round_, thin)))
-    answer = outcome(lambda: Mesh.dome_pattern(7, 3e-3, SPHERE, REST, 2.9e-3))
-    rows.append(trap('patterns', '7 domes 3.10 mm wide, 3 mm apart', answer, 'they overlap'))
-    alone = high(round_, WATER)
-    answer = outcome(lambda: wet_pattern(meshes['dome'], WATER, math.sqrt(0.75) * 9e-3**2))
-    rows.append(trap('patterns', 'domes in water, 9 mm apart', answer, f'above {alone}'))
-    answer = outcome(lambda: wet_pattern(meshes['dome'], WATER, 5e-5, 7))
-    rows.append(trap('patterns', '7 domes in 50 mm²', answer, 'they overlap'))
-    return rows
-
-
-def table(rows: Sequence[Row]) -> str:
-    """Return the rows as text."""
-    parts = ([vars(row) for row in rows if row.kind == kind] for kind in ('result', 'trap'))
-    return '\n\n'.join(map(command.listed, parts))

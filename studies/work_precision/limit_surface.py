@@ -5,20 +5,15 @@ Each point of a contact resists against its own velocity in proportion to its pr
 over a fine quadrature this gives the force F and the moment M of a sole that slides and turns, the
 limit surface. The simulator takes the ellipsoid |(F, M/ρ)| = c with ρ = 2/3 of the sole's radius.
 
-``--rival FOLDER``: a checkout of Gabrieleenx/FrictionModelling (MIT), whose distributed and
-reduced LuGre models, steady, run on the same contacts. Writes limit_surface.json and .png.
+Writes limit_surface.json and .png.
 """
 
 from __future__ import annotations
 
-import importlib
 import math
-import pathlib
-import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
-from unittest import mock
 
 import matplotlib
 import numpy as np
@@ -27,11 +22,7 @@ from matplotlib.figure import Figure
 from ros_pad.capillary.mesh import hexagonal
 from ros_pad.contact.dome import press
 from ros_pad.contact.resistance import DISC_TURNING_RADIUS, DOMED, Foot
-from ros_pad.errors import InvalidInput
-from ros_pad.simulation.scene import Scene
-from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.closed_loop.loops import walk
 from studies.drawing import BLACK, BLUE, ORANGE, SKY, STYLE, VERMILION
 
 FEET = ('large19', 'large37', 'large331', 'small217')
@@ -43,11 +34,6 @@ FINE, COARSE = 200, 24
 
 ANGLES, DIRECTIONS = 91, (0.0, 15.0, 30.0)
 """Mixtures of sliding and turning, and directions of sliding, °, that are tried."""
-
-SCENE, POLICIES = 'hexapod_patches', ('dome', 'flat', 'adaptive')
-
-GRID, SEGMENTS = 51, 20
-"""Cells of the rival's grid along a side, and segments of its reduced model, as in its tests."""
 
 Force = Callable[[np.ndarray], np.ndarray]
 
@@ -196,74 +182,10 @@ def timed(method: Force, rows: np.ndarray, repeats: int) -> float:
     return float(np.median(times))
 
 
-# --- the rival -----------------------------------------------------------------------------------
-
-
-def rivals(patch: Patch, folder: pathlib.Path) -> dict[str, Force]:
-    """Return the distributed and the reduced model of FrictionModelling on a contact.
-
-    Raises
-    ------
-    InvalidInput
-        When the folder does not hold the repository.
-    """
-    sys.path.insert(0, str(folder))
-    try:
-        models = importlib.import_module('frictionModels.frictionModel')
-        surfaces = importlib.import_module('surfaces.surfaces')
-    except ImportError as error:
-        raise InvalidInput(
-            f'{folder}: {error}; a checkout of Gabrieleenx/FrictionModelling is needed'
-        ) from error
-    finally:
-        sys.path.remove(str(folder))
-    cell = 2.04 * float(np.abs(patch.points).max()) / GRID
-    edges = cell * (np.arange(GRID + 1) - 0.5 * GRID)
-    x, y = patch.points.T
-    grid, _, _ = np.histogram2d(x, y, bins=[edges, edges], weights=patch.shares)
-    properties = {
-        'grid_shape': (GRID, GRID), 'grid_size': cell, 'mu_c': 1.0, 'mu_s': 1.0, 'v_s': 1e-3,
-        'alpha': 2, 's0': 1e6, 's1': 8e2, 's2': 0.0, 'dt': 1e-4, 'z_ba_ratio': 0.9,
-        'stability': False, 'elasto_plastic': False, 'steady_state': True,
-    }  # fmt: skip
-
-    def pressure(*_: object) -> np.ndarray:
-        return np.asarray(grid.T[::-1])  # rows from +y to -y
-
-    def model(make: Callable[..., Any], **more: Any) -> Any:
-        made = make(properties=dict(properties), **more)
-        made.update_p_x_y(surfaces.PObject(cell, (GRID, GRID), pressure))
-        made.set_fn(1.0)
-        return made
-
-    distributed = model(models.DistributedFrictionModel)
-    reduced = model(models.ReducedFrictionModel, nr_ls_segments=SEGMENTS)
-    reduced.update_pre_compute()
-
-    def of(made: Any) -> Force:
-        def force(rows: np.ndarray) -> np.ndarray:
-            steps = (made.step({'x': x, 'y': y, 'tau': turn}) for x, y, turn in rows)
-            # Their friction acts on the body, against the motion.
-            return -np.array([[float(each[key]) for key in ('x', 'y', 'tau')] for each in steps])
-
-        return force
-
-    return {f'distributed LuGre, {GRID}²': of(distributed), 'reduced LuGre': of(reduced)}
-
-
 # --- the study -----------------------------------------------------------------------------------
 
 
-def walked(turning: float, policy: str, seed: int) -> float:
-    """Return how far a walk of :data:`SCENE` on L1 comes, m, with feet of a turning radius, m."""
-    scene = Scene.load(SCENE)
-    with mock.patch.object(Foot, 'turning_radius', turning):
-        loop = ClosedLoop(scene, policy, seed, 'L1')
-        walk(loop)
-    return loop.robot.body[0]
-
-
-def methods_of(name: str, patch: Patch, folder: pathlib.Path | None) -> dict[str, Force]:
+def methods_of(name: str, patch: Patch) -> dict[str, Force]:
     """Return each method for a contact."""
     found = {
         'ellipsoid, 2/3 of the sole': ellipsoid(patch.turning),
@@ -276,20 +198,17 @@ def methods_of(name: str, patch: Patch, folder: pathlib.Path | None) -> dict[str
     elif name.startswith('disc'):
         pressure = 'hertz' if 'Hertz' in name else 'even'
         found |= {f'sum, {n} rings': summed(*disc(1.0, n, pressure)) for n in (4, 8, 16)}
-    return found | (rivals(patch, folder) if folder else {})
+    return found
 
 
-def run(folder: pathlib.Path | None, repeats: int, walks: int) -> dict[str, Any]:
-    """Return the document: for each contact its radii, and errors and time of each method.
-
-    Beside it are walks with the sole's radius and with that of its domes.
-    """
-    document: dict[str, Any] = {'rival': folder is not None, 'repeats': repeats, 'contacts': {}}
+def run(repeats: int) -> dict[str, Any]:
+    """Return the document: for each contact its radii, and errors and time of each method."""
+    document: dict[str, Any] = {'repeats': repeats, 'contacts': {}}
     for name, patch in command.each(list(patches().items()), 'limit_surface', 'contact'):
         truth = summed(patch.points, patch.shares)(twists(patch))
         methods = {
             method: errors(patch, force, truth) | {'seconds': timed(force, twists(patch), repeats)}
-            for method, force in methods_of(name, patch, folder).items()
+            for method, force in methods_of(name, patch).items()
         }
         document['contacts'][name] = {
             'turning': patch.turning / patch.radius,
@@ -301,26 +220,17 @@ def run(folder: pathlib.Path | None, repeats: int, walks: int) -> dict[str, Any]
             ]).round(5).tolist(),
             'methods': methods,
         }  # fmt: skip
-    on_domes = domes(Scene.load(SCENE).foot, COARSE)
-    cases = [(policy, seed) for policy in POLICIES for seed in range(walks)]
-    document['walks'] = [
-        (policy, seed, walked(on_domes.turning, policy, seed),
-         walked(on_domes.own_turning, policy, seed))
-        for policy, seed in command.each(cases, 'limit_surface: walks', 'pair')
-    ]  # fmt: skip
     return document
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return errors and times by contact and method, and the walks."""
+    """Return errors and times by contact and method."""
     rows = [
         {'contact': name, 'rho/R': row['own_turning'], 'method': method, **found}
         for name, row in document['contacts'].items()
         for method, found in row['methods'].items()
     ]
-    names = ('policy', 'seed', 'shipped, m', 'own radius, m')
-    walks = [dict(zip(names, walk, strict=True)) for walk in document['walks']]
-    return f'{command.listed(rows)}\n{command.listed(walks)}'
+    return command.listed(rows)
 
 
 def draw(document: dict[str, Any]) -> Figure:
@@ -354,15 +264,10 @@ def draw(document: dict[str, Any]) -> Figure:
 def main(words: Sequence[str]) -> int:
     """Measure, print, draw and write."""
     parser = command.parser('limit_surface', __doc__)
-    parser.add_argument(
-        '--rival', type=command.present, metavar='FOLDER',
-        help='checkout of github.com/Gabrieleenx/FrictionModelling (MIT)',
-    )  # fmt: skip
     command.add_count(parser, '--repeats', 5, 'how often each method is timed')
-    command.add_count(parser, '--walks', 6, 'pairs of walks with each policy', least=0)
     command.add_out(parser)
     options = parser.parse_args(words)
-    document = run(options.rival, options.repeats, options.walks)
+    document = run(options.repeats)
     kept = command.write(options.out, 'limit_surface', document, {'limit_surface': draw(document)})
     command.show(options, kept, table(document))
     return 0

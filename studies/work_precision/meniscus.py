@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, fsolve
-from scipy.special import k0e, k1e
+from scipy.optimize import fsolve
 
 from ros_pad.contact import (
     LARGE_PAD,
@@ -33,6 +32,7 @@ from ros_pad.contact import (
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
+from studies.work_precision.capillary import dome, truth
 from studies.work_precision.comparison import Method, Problem, Result, chart, run
 
 # The sphere is the dome of the large pad at 75 kPa; the liquid is water.
@@ -294,48 +294,9 @@ def ring_problem(progress: Progress) -> Problem:
 
 
 def bath(contact: float, sphere: float, rtol: float, liquid: Liquid = WATER) -> float:
-    """Return the height to which a wide bath at floor level climbs a sphere cut by the floor, m.
-
-    The contact angle must be above 0. The surface is integrated in capillary lengths over its
-    slope angle ψ, from far away, where its equation is linear, to the sphere. The starting
-    distance is found such that the surface meets the sphere at the contact angle.
-    """
-    length = math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
-    radius, start = sphere / length, contact / length
-    centre = math.sqrt((radius - start) * (radius + start))
-
-    def rates(log: float, state: Array) -> tuple[float, float]:
-        psi, (r, z) = math.exp(log), state.tolist()
-        pull = psi / (z + math.sin(psi) / r)
-        return -math.cos(psi) * pull, math.sin(psi) * pull
-
-    def touch(_: float, state: Array) -> float:
-        return math.hypot(state[0], state[1] - centre) - radius
-
-    touch.terminal = True  # type: ignore[attr-defined]
-
-    def meet(distance: float) -> tuple[float, float]:
-        """Return slope angle minus the required one, and height, at the sphere."""
-        first, far = 1e-6, start + distance
-        met = solve_ivp(
-            rates,
-            (math.log(first), math.log(math.pi)),
-            (far, first * k0e(far) / k1e(far)),
-            method='DOP853',
-            rtol=rtol,
-            atol=rtol * min(start, first),
-            events=touch,
-            dense_output=True,
-        )
-        if not met.t_events[0].size:
-            return math.pi, math.nan
-        r, z = met.y_events[0][0]
-        # The inclination of the sphere is 0 at its lowest point.
-        wall = math.atan2(r, centre - z)
-        return math.exp(met.t_events[0][0]) - (math.pi - wall - liquid.angle), float(z)
-
-    distance = brentq(lambda far: meet(far)[0], 1e-3, 30.0, xtol=1e-13, rtol=0.1 * rtol)
-    return length * meet(distance)[1]
+    """Return how high a wide bath at floor level climbs a sphere that the floor cuts, m."""
+    centre = math.sqrt((sphere - contact) * (sphere + contact))
+    return truth(dome(sphere, contact, centre + 0.99 * sphere), liquid, rtol)[0]
 
 
 def _ring(reading: str) -> Callable[[Any, Any], Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two signals at a few fixed moments; ``python -m studies signals`` sends them at random ones."""
+"""Two signals at a few fixed moments."""
 
 import itertools
 import os

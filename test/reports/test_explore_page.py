@@ -3,13 +3,19 @@
 
 import asyncio
 import json
+import os
+import shutil
 import signal
+import socket
+import subprocess
 import sys
 import threading
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import pytest
 
@@ -17,22 +23,90 @@ from ros_pad import cli
 from ros_pad.contact import Foot
 from ros_pad.reports import explore_page
 from ros_pad.signals import INTERRUPTED
-from studies.work_precision import explore as study
 
 pytest.importorskip('nicegui', reason="the extra is missing: pip install 'ros_pad[explore]'")
+
+
+CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'chrome'))), None)
+OPTIONS = (
+    *('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-sync'),
+    *('--disable-background-networking', '--disable-component-update'),
+    '--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1',
+)
+LONGEST = 60e3  # ms, until an answer comes, however slow the machine
+
+
+@contextmanager
+def served(*words):
+    """Run ``pad explore`` with arguments; yield the address of its page, and the process."""
+    environment = {name: value for name, value in os.environ.items() if 'PYTEST' not in name}
+    child = subprocess.Popen(
+        [sys.executable, '-m', 'ros_pad', 'explore', '--no-browser', *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+    )
+    try:
+        address = child.stdout.readline().partition(' ')[0]
+        while not listens(address):
+            if child.poll() is not None:
+                raise RuntimeError(f'pad explore ended: {child.communicate()[1]}')
+            time.sleep(0.05)
+        yield address, child
+    finally:
+        child.send_signal(signal.SIGTERM)
+        child.communicate(timeout=60)
+
+
+def listens(address):
+    parts = urllib.parse.urlsplit(address)
+    try:
+        socket.create_connection((parts.hostname, parts.port)).close()
+    except OSError:
+        return False
+    return True
+
+
+@contextmanager
+def browser():
+    """Yield a headless Chromium that finds no host but this one."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        found = play.chromium.launch(executable_path=CHROMIUM, args=[*OPTIONS])
+        try:
+            yield found
+        finally:
+            found.close()
+
+
+def opened(chromium, address):
+    """Return a page with its first answer."""
+    page = chromium.new_page()
+    page.set_default_timeout(LONGEST)
+    page.goto(address)
+    page.wait_for_selector('[data-answer]')
+    return page
+
+
+def slider_of(page, label):
+    """Return a slider by the label of its field."""
+    names = f'[aria-label="{label}"], [aria-label^="{label},"]'  # the second has a unit
+    return page.locator(f'input[type=range]:is({names})')
 
 
 @pytest.fixture(scope='module')
 def page():
     """Yield a page of large37 with the addresses that it has asked for."""
     pytest.importorskip('playwright')
-    if study.CHROMIUM is None:
+    if CHROMIUM is None:
         pytest.skip('no Chromium is installed')
-    with study.served('large37') as (address, _), study.browser() as chromium:
+    with served('large37') as (address, _), browser() as chromium:
         context = chromium.new_context(accept_downloads=True)
         asked: list[str] = []
         context.on('request', lambda request: asked.append(request.url))
-        found = study.opened(context, address)
+        found = opened(context, address)
         found.on('websocket', lambda line: asked.append(line.url))
         found.asked = asked
         yield found
@@ -61,7 +135,7 @@ def error_at(page, name):
 
 def test_a_slider_moves_the_numbers_to_those_of_pad_contact(page, capsys):
     before = answers(page)
-    slider = study.slider(page, 'Pressure')
+    slider = slider_of(page, 'Pressure')
     slider.focus()
     page.keyboard.press('ArrowLeft')
     page.wait_for_function("document.querySelector('[name=pressure]').value === '76'")
@@ -96,7 +170,7 @@ def test_bad_input_is_marked_where_it_is_and_the_rest_stays(page):
     assert page.locator('#pressed-gap').inner_text() == '–'
     typed(page, 'load', '5.6')
     # What is typed moves the slider, too.
-    assert study.slider(page, 'Load on the foot').input_value() == '5.6'
+    assert slider_of(page, 'Load on the foot').input_value() == '5.6'
 
 
 def test_the_foot_file_walks(page, tmp_path, capsys):
@@ -123,7 +197,7 @@ def test_nothing_is_loaded_from_elsewhere(page):
 
 
 def test_other_names_and_pages_are_refused_and_ctrl_c_ends_it():
-    with study.served() as (address, child):
+    with served() as (address, child):
         with urllib.request.urlopen(address) as answer:
             assert answer.status == 200
         socket_io = f'{address}_nicegui_ws/socket.io/?EIO=4&transport=polling'

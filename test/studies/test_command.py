@@ -7,9 +7,7 @@ import types
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from ros_pad.errors import InvalidInput
 from studies import command
 from studies.__main__ import STUDIES, main
 from studies.work_precision import comparison
@@ -67,16 +65,9 @@ def test_a_work_precision_study_writes_table_json_and_pictures(tmp_path, capsys)
     assert {'method', 'us_per_solve', 'error', 'failures', 'cases', 'versus'} <= set(rows[0])
 
 
-def test_without_a_folder_each_chart_gets_its_own(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for _ in range(2):
-        assert command.compare_methods('roots', SMALL, []) == 0
-    made = sorted(path.name for path in (tmp_path / 'runs').iterdir())
-    assert made == ['chart_roots', 'chart_roots_2']
-
-
 def test_processes_keep_the_order_and_pass_errors_on():
-    assert command.in_processes(divmod, [(7, 2), (9, 4)], 2, 'test') == [(3, 1), (2, 1)]
+    cases = [(number, 3) for number in range(20)]
+    assert command.in_processes(divmod, cases, 2, 'test') == [divmod(*each) for each in cases]
     with pytest.raises(ZeroDivisionError):
         command.in_processes(divmod, [(7, 2), (9, 0)], 1, 'test')
 
@@ -94,19 +85,3 @@ def test_counts_have_a_least_value(capsys):
 def test_errors_of_a_study_end_with_a_status(capsys):
     assert main(['thesis', '--only', '19']) == 2
     assert 'figures = [19]' in capsys.readouterr().err
-
-
-def test_a_document_has_its_machine_and_pictures(tmp_path):
-    kept = command.write(tmp_path, 'it', {'rows': [1]}, {'picture': Figure()})
-    assert json.loads((tmp_path / 'it.json').read_text()) == kept
-    assert kept['rows'] == [1] and 'processor' in kept['machine']
-    assert (tmp_path / 'picture.png').read_bytes().startswith(b'\x89PNG')
-
-
-def test_invalid_input_is_bad_usage(monkeypatch, capsys):
-    def refuse(*_):
-        raise InvalidInput('floors = -1')
-
-    monkeypatch.setattr(command, 'compare_methods', refuse)
-    assert main(['contact']) == 2
-    assert 'studies contact: floors = -1' in capsys.readouterr().err

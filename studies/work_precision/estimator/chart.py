@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy import stats
 
-from studies.closed_loop.conformal import interval
-from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, SKY, STYLE, VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, PALE, SKY, STYLE, VERMILION
+from studies.samples import share_interval
 from studies.work_precision.estimator.conditions import CONFIGURED, NOT_CONFIGURED
-from studies.work_precision.estimator.methods import CUSUM, RATIO, SHIPPED, SPEED
+from studies.work_precision.estimator.methods import CUSUM, RATIO, SHIPPED
 from studies.work_precision.estimator.tally import TARGETS, Row
 
 _TARGET: dict[str, Any] = {'color': BLACK, 'lw': 0.9, 'ls': '--', 'zorder': 1.5}
@@ -27,7 +27,6 @@ _TARGET: dict[str, Any] = {'color': BLACK, 'lw': 0.9, 'ls': '--', 'zorder': 1.5}
 
 _LOOKS: dict[tuple[str, str], dict[str, Any]] = {
     (RATIO, ''): {'color': VERMILION, 'marker': 'X'},
-    (SPEED, ''): {'color': ORANGE, 'marker': 's'},
     (CUSUM, '10 mm/s'): {'color': SKY, 'marker': 'o'},
     (CUSUM, '20 mm/s'): {'color': BLUE, 'marker': 'o'},
     (CUSUM, '40 mm/s'): {'color': BLUE, 'marker': 'o', 'mfc': 'white', 'ls': ':'},
@@ -35,7 +34,6 @@ _LOOKS: dict[tuple[str, str], dict[str, Any]] = {
 }
 _LABELS = {
     RATIO: 'T/N above 0.05 to 0.6',
-    SPEED: 'slip speed above 6 to 100 mm/s',
     CUSUM: 'CUSUM for {}, above 0.5 to 16',
     SHIPPED: 'FootEstimator, alarm as shipped',
 }
@@ -67,9 +65,7 @@ def draw_methods(rows: Sequence[Row]) -> Figure:
             for (name, variant), look in _LOOKS.items()
         ]
         handles.append(Line2D([], [], **_TARGET, label='target, at most'))
-        title = (
-            'a, b: no median where most slips are missed, or begin in an alarm (T/N, most margins)'
-        )
+        title = 'a, b: no median where most slips are missed, or begin in an alarm (T/N)'
         figure.legend(handles=handles, loc='outside lower center', ncol=3, title=title)
     return figure
 
@@ -232,4 +228,4 @@ def _ends(row: Row, measure: str) -> tuple[float, float]:
         low, high = stats.chi2.ppf((0.025, 0.975), (2 * count, 2 * count + 2)) / 2.0
         return (float(low) if count else 0.0) / row.stick_minutes, float(high) / row.stick_minutes
     of = row.slips if measure == 'misses' else row.stances
-    return interval(round(getattr(row, measure) * of), of)
+    return share_interval(round(getattr(row, measure) * of), of)

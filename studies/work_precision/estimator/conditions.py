@@ -93,16 +93,6 @@ def at_1000_hertz(scene: Scene) -> Scene:
     return replace(scene, sensors=replace(scene.sensors, rate=1000.0))
 
 
-def with_stiffness(factor: float) -> World:
-    """Return a function that multiplies the shear stiffness of the feet of a scene."""
-
-    def change(scene: Scene) -> Scene:
-        stiffness = factor * scene.foot.shear_stiffness
-        return replace(scene, foot=replace(scene.foot, shear_stiffness=stiffness))
-
-    return change
-
-
 def with_wet_friction(friction: float) -> World:
     """Return a function that sets the boundary friction of the feet of a scene."""
     return lambda scene: replace(scene, foot=replace(scene.foot, boundary_friction=friction))
@@ -149,7 +139,6 @@ CHANGES = (
         'sample rate', 'Hz', (50.0, 100.0, 250.0, 500.0, 1000.0), 250.0,
         disturb=rate, world=lambda _: at_1000_hertz,
     ),
-    Change('shear stiffness', 'times', STIFFNESSES[::2], 1.0, CONFIGURED, world=with_stiffness),
     Change('shear stiffness', 'times', STIFFNESSES, 1.0, NOT_CONFIGURED, configured_stiffness),
     Change('wet friction', '', WET_FRICTIONS, 0.12, CONFIGURED, world=with_wet_friction),
     Change(

@@ -25,9 +25,8 @@ from studies.work_precision.estimator.tally import (
 )
 from studies.work_precision.estimator.walks import Flags, Recording
 
-RATIO, SPEED, CUSUM, SHIPPED = 'T/N', 'slip speed', 'CUSUM', 'FootEstimator, alarm'
+RATIO, CUSUM, SHIPPED = 'T/N', 'CUSUM', 'FootEstimator, alarm'
 RATIOS = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.3, 0.4, 0.6)
-SPEEDS = (0.006, 0.01, 0.014, 0.02, 0.03, 0.04, 0.06, 0.1)  # m/s
 CUSUM_SPEEDS = (0.01, 0.02, 0.04)  # m/s
 CUSUM_THRESHOLDS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 
@@ -85,19 +84,6 @@ class SlipSpeed:
         return -along / (self._smoothing * (math.hypot(push_x, push_y) or math.inf)), dt
 
 
-def speed_alarm(settings: Settings, threshold: float) -> Update:
-    """Return an alarm that is on if the slip speed is above a threshold, m/s."""
-    slip = SlipSpeed(settings)
-
-    def update(
-        time: float, force: Sequence[float], position: Sequence[float], pressure: float
-    ) -> bool:
-        found = slip.update(time, force, position)
-        return found is not None and found[0] > threshold
-
-    return update
-
-
 def cusum_alarm(settings: Settings, speed: float, threshold: float) -> Update:
     """Return the test of :class:`SlipAlarm`, a CUSUM, on the slip speed."""
     foot, _, tuning = settings
@@ -139,7 +125,6 @@ class Method:
 def methods() -> list[Method]:
     """Return every method with its thresholds."""
     found = [Method(RATIO, '', r, '', lambda s, r=r: ratio_alarm(s, r)) for r in RATIOS]  # type: ignore[misc]
-    found += [Method(SPEED, '', v, 'm/s', lambda s, v=v: speed_alarm(s, v)) for v in SPEEDS]  # type: ignore[misc]
     for speed in CUSUM_SPEEDS:
         found += [
             Method(CUSUM, f'{1e3 * speed:g} mm/s', t, '',

@@ -14,6 +14,7 @@ import numpy as np
 
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FeetEstimator, FootEstimator
+from studies.samples import bootstrap
 from studies.work_precision.estimator.walks import LOADED, SETTLED, Flags, Floats, Recording
 
 MOVING = 5e-3  # m/s: a faster contact slips
@@ -44,10 +45,8 @@ class Estimates:
     Attributes
     ----------
     slipping, standing, fresh : array of bool
-    wet, mean, sd, margin, speed : array
-        P(wet), friction and its standard deviation, friction margin, slip speed in m/s.
-    updates : int
-        Number of samples.
+    wet, mean, sd, margin : array
+        P(wet), friction and its standard deviation, friction margin.
     """
 
     slipping: Flags
@@ -57,15 +56,13 @@ class Estimates:
     mean: Floats
     sd: Floats
     margin: Floats
-    speed: Floats
-    updates: int
 
 
 def replay(walk: Recording) -> Estimates:
     """Return the results for the readings of a robot, whose feet learn together."""
     legs = walk.load.shape[1]
     estimators = FootEstimator.of(FeetEstimator(legs, *walk.settings))
-    out = np.empty((*walk.load.shape, 8))
+    out = np.empty((*walk.load.shape, 7))
     rows = walk.rows
     for sample, (stamp, arrived) in enumerate(
         zip(walk.stamps.tolist(), walk.arrived.tolist(), strict=True)
@@ -81,13 +78,12 @@ def replay(walk: Recording) -> Estimates:
             now = estimator.estimate
             found.append(
                 (now.slipping, now.standing, new and now.fresh, now.wet_probability,
-                 now.friction_mean, now.friction_sd, now.margin, now.slip_speed)
+                 now.friction_mean, now.friction_sd, now.margin)
             )  # fmt: skip
         out[sample] = found
     slipping, standing, fresh = np.moveaxis(out[..., :3] > 0.5, 2, 0)
-    wet, mean, sd, margin, speed = np.moveaxis(out[..., 3:], 2, 0)
-    updates = int(walk.arrived.sum())
-    return Estimates(slipping, standing, fresh, wet, mean, sd, margin, speed, updates)
+    wet, mean, sd, margin = np.moveaxis(out[..., 3:], 2, 0)
+    return Estimates(slipping, standing, fresh, wet, mean, sd, margin)
 
 
 @dataclass
@@ -347,15 +343,12 @@ def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Ro
     )
 
 
-DRAWS = 2000  # of the walks
-
-
 def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
     """Return the row of several walks, with intervals over the walks."""
     whole = Tally()
     for each in tallies:
         whole.add(each)
-    parts = {
+    parts: dict[str, list[tuple[float, float]]] = {
         'misses': [(each.missed, each.slips) for each in tallies],
         'displaced_misses': [(each.displaced_missed, each.displaced) for each in tallies],
         'false_per_minute': [(each.false_alarms, each.stick_time / 60.0) for each in tallies],
@@ -368,13 +361,8 @@ def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
             for found in (_joined(each.covered.values()) for each in tallies)
         ],
     }
-    drawn = np.random.default_rng(0).integers(len(tallies), size=(DRAWS, len(tallies)))
-    intervals = {}
-    for name, pairs in parts.items():
-        hits, all_of = np.array(pairs, dtype=np.float64)[drawn].sum(axis=1).T
-        if (all_of > 0.0).all():
-            ends = np.quantile(hits / all_of, [0.025, 0.975])
-            intervals[name] = [float(end) for end in ends]
+    found = {name: bootstrap(pairs, 2000) for name, pairs in parts.items()}
+    intervals = {name: list(ends) for name, ends in found.items() if math.isfinite(ends[0])}
     return row_of(whole, walks=len(tallies), intervals=intervals, **names)
 
 

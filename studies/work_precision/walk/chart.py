@@ -15,9 +15,9 @@ from matplotlib.lines import Line2D
 from ros_pad.pace import Progress
 from studies import command
 from studies.drawing import BLACK, BLUE, GREEN, PALE, SKY, STYLE, VERMILION
-from studies.work_precision.walk.hexapod import DRAKE, FREE, TOP
+from studies.work_precision.walk.hexapod import DRAKE, TOP
 from studies.work_precision.walk.results import FAILED, WalkResult
-from studies.work_precision.walk.walkers import HEXAPOD, RAIL, TOWING, named
+from studies.work_precision.walk.walkers import HEXAPOD, RAIL, named
 
 # Methods that are shown walk by walk.
 SHOWN = (named('L1', 4e-3), *(named(family, 2e-3) for family in ('L2', 'MuJoCo defaults')))
@@ -70,19 +70,14 @@ _LOOKS: dict[str, dict[str, Any]] = {
 
 def draw(results: Sequence[WalkResult]) -> Figure:
     """Return the picture: time against each error, distances walk by walk, and the rail leg."""
-    hexapod, towing, rail = (
-        [result for result in results if result.robot == robot]
-        for robot in (HEXAPOD, TOWING, RAIL)
+    hexapod, rail = (
+        [result for result in results if result.robot == robot] for robot in (HEXAPOD, RAIL)
     )
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.5, 8.0), layout='constrained')
         panels = figure.subplots(2, 3).ravel()
-        # Without Drake there is no towing; the heading is then drawn in its place.
-        places = zip('abce', (0, 1, 2, 4)[: 3 if towing else 4], _UNITS, strict=False)
-        for letter, place, name in places:
+        for letter, place, name in zip('abce', (0, 1, 2, 4), _UNITS, strict=True):
             _errors(panels[place], hexapod, name, f'{letter}  hexapod: {_UNITS[name][0]}')
-        if towing:
-            _tows(panels[4], towing)
         _strips(panels[3], hexapod)
         _errors(panels[5], rail, 'distance', 'f  rail leg: distance')
         families = {result.family for result in results}
@@ -94,7 +89,7 @@ def draw(results: Sequence[WalkResult]) -> Figure:
         handles.append(
             Line2D([], [], color=PALE, alpha=0.5, lw=7.0, label='doubt about the reference')
         )
-        title = 'Mark: median of the walks; whisker: the worst. Soles free to turn: dashed in e.'
+        title = 'Mark: median of the walks; whisker: the worst.'
         figure.legend(handles=handles, loc='outside lower center', ncol=4, title=title)
     return figure
 
@@ -126,19 +121,6 @@ def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> N
         panel.set_ylim(bottom=0.3 * doubt)
     panel.xaxis.set_major_formatter('{x:g}')
     panel.yaxis.set_major_formatter('{x:g}')
-    panel.grid(color=PALE, alpha=0.25, lw=0.5)
-
-
-def _tows(panel: Axes, part: Sequence[WalkResult]) -> None:
-    """Draw the distance over the weight in tow, with soles that resist turning, and without."""
-    for result in part:
-        family, free = result.family.removesuffix(f', {FREE}'), FREE in result.family
-        loads = [walk for walk in result.walks if walk['walk'].endswith(' N')]
-        x = [float(walk['walk'].removesuffix(' N')) for walk in loads]
-        y = [1e3 * walk['distance'] for walk in loads]
-        panel.plot(x, y, ls='--' if free else '-', lw=1.0, ms=5, **_LOOKS[family])
-    panel.set_title('e  hexapod: dry, flat, with a load in tow')
-    panel.set(xlabel='towed, N', ylabel='distance, mm a cycle')
     panel.grid(color=PALE, alpha=0.25, lw=0.5)
 
 

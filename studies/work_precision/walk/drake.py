@@ -55,8 +55,6 @@ class DrakeRobot:
         Time between set-points, s.
     step : float
         Step of Drake, s; a period is a whole number of steps.
-    turning : float
-        Factor on the lever arm of a sole that turns; 0: it does not resist.
 
     Raises
     ------
@@ -64,9 +62,7 @@ class DrakeRobot:
         When Drake is missing.
     """
 
-    def __init__(
-        self, scene: Scene, floor: Floor, period: float, step: float, turning: float = 1.0
-    ) -> None:
+    def __init__(self, scene: Scene, floor: Floor, period: float, step: float) -> None:
         body: Any = scene.body
         self._body = body
         self.legs, self.period, self.time = scene.legs, period, 0.0
@@ -78,7 +74,7 @@ class DrakeRobot:
         self._dt = period / self._substeps
         self._steps = 0
         self._foot = scene.foot.on_rough(scene.floor.roughness)
-        self._lever = turning * self._foot.turning_radius
+        self._lever = self._foot.turning_radius
         self._films = [Film(self._foot, scene.floor.viscosity) for _ in self.legs]
         self._solver = FeetSolver(body.robot)
         gait: Any = scene.gait

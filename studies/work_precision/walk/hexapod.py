@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import importlib.util
-import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,12 +14,11 @@ from ros_pad.control.policies import DOME, FLAT, policy_named
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.scene import Scene
 from studies.work_precision.walk.drake import DrakeRobot
 from studies.work_precision.walk.walkers import (
     CYCLES,
     HEXAPOD,
-    TOWING,
     Walk,
     Walked,
     Walker,
@@ -111,25 +109,18 @@ def _planar(family: str, step: float, compiled: bool) -> Walker:
     return Walker(family, named(family, step), step, walk)
 
 
-def _full(
-    family: str, settings: SolverSettings, ours: bool = True, turning: bool = True
-) -> Walker:
-    """Return a walker of L2; without ``turning`` soles do not resist turning."""
-
+def _full(family: str, settings: SolverSettings, ours: bool = True) -> Walker:
     def make(case: Walk) -> FullRobot:
-        robot = FullRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
-        robot.soles.lever *= turning
-        return robot
+        return FullRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
 
     return _sampled(family, settings.timestep, make, ours)
 
 
-def _drake(step: float, turning: bool = True) -> Walker:
+def _drake(step: float) -> Walker:
     def make(case: Walk) -> DrakeRobot:
-        floor = case.scene.floor.build(case.seed)
-        return DrakeRobot(case.scene, floor, SAMPLE, step, float(turning))
+        return DrakeRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, step)
 
-    return _sampled(DRAKE if turning else f'{DRAKE}, {FREE}', step, make, False)
+    return _sampled(DRAKE, step, make, False)
 
 
 def _sampled(family: str, step: float, make: Callable[[Walk], Any], ours: bool) -> Walker:
@@ -145,52 +136,3 @@ def _sampled(family: str, step: float, make: Callable[[Walk], Any], ours: bool) 
         return walked(robot, case.scene, count * round(SAMPLE / step), taken)
 
     return Walker(family, named(family, step), step, walk, ours)
-
-
-# --- a load in tow ------------------------------------------------------------------------------
-
-FREE = 'soles free'  # to turn: nothing resists
-WEIGHTS = (0.0, 3.0, 6.0, 9.0, 12.0)  # N
-SWITCHES = {'soft line': 0.25, 'servos 3 times as stiff': 3.0, 'servos 10 times as stiff': 10.0}
-
-
-def towing_walks() -> list[Walk]:
-    """Return walks on dry flat ground with loads in tow, and with the effect of each part less."""
-    scene = replace(Scene.load('hexapod_patches'), settle=SETTLE, cycles=CYCLES[TOWING])
-    scene = replace(scene, floor=replace(scene.floor, kind='dry'))
-    loads = [replace(scene, tow=replace(scene.tow, weight=weight)) for weight in WEIGHTS]
-    walks = [Walk(f'{weight:g} N', load, 0.0) for weight, load in zip(WEIGHTS, loads, strict=True)]
-    heavy = loads[-1]
-    for name, factor in SWITCHES.items():
-        scene = _stiffer(heavy, factor)
-        if name == 'soft line':
-            tow = replace(heavy.tow, stiffness=factor * heavy.tow.stiffness)
-            scene = replace(heavy, tow=tow)
-        walks.append(Walk(f'{WEIGHTS[-1]:g} N, {name}', scene, 0.0))
-    return walks
-
-
-def _stiffer(scene: Scene, factor: float) -> Scene:
-    """Return a scene whose servos are stiffer, and damped alike."""
-    assert isinstance(scene.body, LeggedBody) and scene.body.robot.servo is not None
-    servo = scene.body.robot.servo
-    servo = replace(
-        servo,
-        stiffness=factor * servo.stiffness,
-        torque=factor * servo.torque,
-        damping=math.sqrt(factor) * servo.damping,
-    )
-    robot = replace(scene.body.robot, servo=servo)
-    return replace(scene, body=replace(scene.body, robot=robot))
-
-
-def towing_walkers() -> list[Walker]:
-    """Return L1, L2 and Drake, with soles that resist turning and with those that do not."""
-    fine = replace(RECOMMENDED, timestep=TOP_STEP)
-    return [
-        _planar('L1', SAMPLE, False),
-        _full('L2', fine),
-        _full(f'L2, {FREE}', fine, turning=False),
-        _drake(2e-4),
-        _drake(2e-4, turning=False),
-    ]  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress
-from studies.work_precision.walk.walkers import HEXAPOD, RAIL, TOWING, Walk, Walked, Walker
+from studies.work_precision.walk.walkers import HEXAPOD, RAIL, Walk, Walked, Walker
 
 FAILED = 0.1  # relative error of distance or slip above which a walk has failed
 LEAST = 0.01  # share of the stride: errors of shorter distances are relative to this share
@@ -40,7 +40,7 @@ WalkResult = SimpleNamespace
 """
 
 RELATIVE = ('distance', 'slip')
-MEASURES = {HEXAPOD: (*RELATIVE, 'lateral', 'yaw'), TOWING: RELATIVE, RAIL: RELATIVE}
+MEASURES = {HEXAPOD: (*RELATIVE, 'lateral', 'yaw'), RAIL: RELATIVE}
 
 
 def run(

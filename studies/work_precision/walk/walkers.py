@@ -9,8 +9,8 @@ from typing import Any
 
 from ros_pad.simulation.scene import Scene
 
-HEXAPOD, TOWING, RAIL = 'hexapod', 'hexapod that tows', 'rail leg'
-CYCLES = {HEXAPOD: 6, TOWING: 8, RAIL: 10}
+HEXAPOD, RAIL = 'hexapod', 'rail leg'
+CYCLES = {HEXAPOD: 6, RAIL: 10}
 
 
 @dataclass(frozen=True)

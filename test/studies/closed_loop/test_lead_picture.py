@@ -8,7 +8,6 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from ros_pad.errors import InvalidInput, PadError
 from ros_pad.reports import style
 from ros_pad.simulation import Scene
 from ros_pad.trials import run
@@ -29,9 +28,3 @@ def test_lead_picture(tmp_path):
     colours = {tuple(pixel) for pixel in np.round(255 * picture[..., :3]).reshape(-1, 3).tolist()}
     for colour in (style.WET, style.BLUE, style.VERMILION):
         assert tuple(float(int(colour[k : k + 2], 16)) for k in (1, 3, 5)) in colours
-    with pytest.raises(PadError, match='exists'):
-        lead_picture(trials, path)
-    lead_picture(trials, path, force=True)
-    assert path.read_bytes() == data
-    with pytest.raises(InvalidInput, match='one scene and seed'):
-        lead_picture([walk, dataclasses.replace(walk, seed=8)], path)

@@ -36,7 +36,7 @@ def test_ratio_by_hand():
 def test_the_page_has_the_tables_of_the_last_run():
     document = json.loads((policies.command.CHARTS / 'policies.json').read_text())
     page = policies.PAGE.read_text()
-    assert policies.written(page, policies.overall(document)) == page
+    assert policies.command.pasted(page, policies.MARKS, policies.overall(document)) == page
 
 
 def border(policy, morphology):
@@ -52,14 +52,3 @@ def test_the_value_of_a_foot_where_each_step_is_on_new_ground():
     policy = rivals.pomdp(loss=1.0, length=1e-3, share=0.9)
     assert border(policy, 'dome') == pytest.approx(100 * (1.0 - 0.0995) / 2.0, abs=1.0)
     assert border(policy, 'flat') == pytest.approx(100 * 1.0005 / 2.0, abs=1.0)
-
-
-def test_a_bandit_takes_the_morphology_that_goes_further_and_tries_the_other():
-    policy = rivals.discounted_ucb(0.9, 0.2)
-    before, x, chosen = 0.0, 0.0, []
-    for _ in range(300):
-        # Position ahead: the next step is taken to be as long as the last one.
-        morphology = policy(replace(STEP, next_position=(2.0 * x - before, 0.0))).morphology
-        chosen.append(morphology)
-        before, x = x, x + (0.13 if morphology == 'flat' else 0.02)
-    assert 0.7 < chosen.count('flat') / 300 < 1.0

@@ -25,9 +25,3 @@ def test_what_is_no_error_of_ours_is_found():
     target(b'ours')
     with pytest.raises(ZeroDivisionError):
         target(b'other')
-
-
-def test_an_input_can_be_run_again(tmp_path):
-    file = tmp_path / 'finding'
-    file.write_bytes(b'{kind: leak')
-    assert fuzz.main(['faults', str(file)]) == 0

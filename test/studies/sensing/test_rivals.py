@@ -3,11 +3,8 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import skew
-from ros_pad.sensing.body_filter import GRAVITY
 from studies.sensing import rivals, study, walks
 
 GO2 = Robot.load('go2')
@@ -22,22 +19,6 @@ def log():
     return walks.walk(COURSE, 1, 6.0)
 
 
-def element(found):
-    """Return rotation, velocity, position and footholds as one matrix of the group."""
-    made = np.eye(9)
-    made[:3, :3] = found.turn
-    made[:3, 3:] = np.vstack([found.velocity, found.position, found.feet]).T
-    return made
-
-
-def exponential(error):
-    """Return the matrix of the group whose logarithm is an error without biases, (21,)."""
-    algebra = np.zeros((9, 9))
-    algebra[:3, :3] = skew(error[:3])
-    algebra[:3, 3:] = error[3:].reshape(6, 3).T
-    return expm(algebra)
-
-
 def run(found, log, rows):
     stands = rivals.loads_of(GO2, log)
     for row in rows:
@@ -46,31 +27,6 @@ def run(found, log, rows):
             *(log.joint_positions[row], log.joint_velocities[row], stands[row]),
         )
     return found
-
-
-def test_corrections_are_those_of_the_group():
-    found = rivals.InvariantFilter(GO2, COURSE)
-    error = np.random.default_rng(1).normal(0.0, 0.7, 27)
-    found.velocity, found.feet = np.array((1.0, 2.0, 3.0)), np.arange(12.0).reshape(4, 3)
-    goal = exponential(error[:21]) @ element(found)
-    found.apply(error)
-    np.testing.assert_allclose(element(found), goal, atol=1e-12)
-    np.testing.assert_array_equal(found.biases.ravel(), error[21:])
-
-
-def test_large_errors_move_the_same_along_any_path():
-    generator = np.random.default_rng(2)
-    estimate, truth = (rivals.InvariantFilter(GO2, COURSE) for _ in range(2))
-    error = generator.normal(0.0, 0.5, 21)
-    estimate.apply(np.concatenate([error, np.zeros(6)]))
-    for _ in range(200):
-        rate, force = generator.normal(0.0, 3.0, 3), generator.normal(0.0, 5.0, 3) - GRAVITY
-        step = estimate.predict(rate, force, STILL)[:21, :21]
-        np.testing.assert_array_equal(step, truth.predict(rate, force, STILL)[:21, :21])
-        error = step @ error
-    np.testing.assert_allclose(
-        element(estimate) @ np.linalg.inv(element(truth)), exponential(error), atol=1e-9
-    )
 
 
 def test_nothing_is_learnt_about_heading_and_place(log):

@@ -2,14 +2,13 @@
 """Walks that are changed to show where estimates of the velocity diverge, and their laws."""
 
 import dataclasses
-import json
 
 import numpy as np
 import pytest
 
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import cross, matrix
-from studies.sensing import stability, study, walks
+from studies.sensing import stability, walks
 
 GO2 = Robot.load('go2')
 CALM = walks.Course(noise=walks.Noise(*[0.0] * 8))
@@ -84,27 +83,3 @@ def test_while_all_feet_slip_the_accelerometer_carries_the_velocity_on(monkeypat
     assert not any(best.silent)
     for rival in ('no rejection', 'invariant', 'odometry'):
         assert stability.first(found[rival], found[rival].error, 0.08) < 0.3
-
-
-def test_all_walks_and_failures_run_to_the_end(monkeypatch, tmp_path, capsys):
-    pytest.importorskip('mujoco')
-
-    def stub(seed):
-        return {
-            name: (np.full((1, 5), 0.01 * seed**2), np.ones((1, 5)))
-            for name in ('law', *stability.METHODS)
-        }
-
-    rates = stability.CASES['low rates'][1]
-    monkeypatch.setattr(study, 'COURSES', {'dry': walks.Course()})
-    monkeypatch.setattr(study, 'FIRST_SEED', 1)
-    monkeypatch.setattr(stability, 'CASES', {'low rates': (stub, rates)})
-    words = ['--all', '--picture', '--seeds', '2', '--duration', '6', '--out', str(tmp_path)]
-    assert study.main(words) == 0
-    out = capsys.readouterr().out
-    assert '| dry | ' in out
-    assert '| low rates, Hz | 500; doubt 500 | 500; doubt 500 |' in out
-    curves = json.loads((tmp_path / 'sensing_stability.json').read_text())['curves']
-    assert curves[0]['error'] == pytest.approx([np.sqrt(0.025)] * 5)
-    for name in ('sensing.png', 'sensing_stability.png'):
-        assert (tmp_path / name).read_bytes().startswith(b'\x89PNG')

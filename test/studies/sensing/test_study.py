@@ -22,7 +22,6 @@ def test_the_estimator_beats_its_rivals_on_a_short_walk(monkeypatch, capsys):
     assert best['slip_coverage'] > 0.9
     for rival in ('no rejection', 'invariant', 'odometry'):
         assert best['velocity_error'] < 0.7 * rows[rival]['velocity_error']
-    assert rows['odometry']['drift'] < rows['odometry, r = 0']['drift']
 
 
 def test_logs_agree_with_themselves():

@@ -2,28 +2,21 @@
 """Bench results agree with the thesis' program, 30-digit roots, or other methods in this file."""
 
 import dataclasses
-import json
 import math
 import pathlib
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 import yaml
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
 from ros_pad import configuration
-from ros_pad.errors import ConfigError, NoEquilibrium
+from ros_pad.errors import ConfigError
 from studies.thesis import bench
 from studies.thesis.bench import CODED
-from studies.thesis.tangential import slip_force
 
 BENCHES = ('inflation', 'press', 'tangential', 'foot')
 
 TRIALS = {kind: bench.run(f'bench_{kind}') for kind in BENCHES}
-ONE = TRIALS['tangential'].scene.foot
-DRAG = SimpleNamespace(film_thickness=3e-4, viscosity=1e-3, speed=2e-4, dwell=1.0)
 
 
 def errors(rows):
@@ -92,42 +85,6 @@ def test_pressed_domes_against_what_was_measured():
         for own, found in zip(PROGRAM['height'], (1.8e-3, 1.4e-3, 1.0e-3), strict=True)
     ]
     assert all(row.claimed == 'no error stated' for row in trial.rows)
-
-
-def drained(radius, contact_pressure, time, viscosity=1e-3, start=3e-4):
-    """Return the film, m, by integrating Stefan's equation for the logarithm of the film."""
-    rate = 2.0 * contact_pressure / (3.0 * viscosity * radius**2)
-    solved = solve_ivp(
-        lambda _, y: -rate * np.exp(2.0 * y), (0.0, time), [math.log(start)],
-        method='Radau', rtol=1e-7, atol=1e-8,
-    )  # fmt: skip
-    return math.exp(solved.y[0, -1])
-
-
-@pytest.mark.parametrize('load, pressure, sole', [(0.3, 75e3, 12e-3), (0.4, 0.0, 3.2e-3)])
-def test_onset_of_slip_by_another_method(load, pressure, sole):
-    """The film is integrated; slip begins where the pull first exceeds the friction."""
-    foot = dataclasses.replace(ONE, sole_radius=sole)
-    if pressure:
-        area = load / pressure
-        radius, squeeze = math.sqrt(area / math.pi), pressure
-    else:
-        area = min(load / 10444.0, math.pi * sole**2)
-        radius, squeeze = sole, load / (math.pi * sole**2)
-    dry = 0.35 * load + 4700.0 * area
-    stiffness = 5000.0 / 19.0
-
-    def spare(pull):
-        film = drained(radius, squeeze, 1.0 + pull / (stiffness * 2e-4))
-        touching = math.exp(-((film / 0.5e-6) ** 2))
-        return pull - touching * dry - (1.0 - touching) * 0.12 * load
-
-    pulls = np.linspace(0.0, dry, 11)
-    first = next(k for k, pull in enumerate(pulls) if spare(pull) >= 0.0)
-    expected = brentq(spare, pulls[first - 1], pulls[first], xtol=1e-7)
-    found = slip_force(foot, DRAG, load, pressure, True)
-    assert found == pytest.approx(expected, rel=1e-4)
-    assert slip_force(foot, DRAG, load, pressure, False) == pytest.approx(dry, rel=1e-12)
 
 
 def test_orderings_of_the_thesis():
@@ -236,25 +193,6 @@ def test_the_greatest_rise_by_another_method(name, rise, scale, low, high):
     assert radius.claimed == '0.3 to 0.8 mm'
 
 
-@pytest.mark.parametrize('kind', BENCHES)
-def test_json(kind):
-    trial = TRIALS[kind]
-    table = json.loads(json.dumps(trial.as_dict(), allow_nan=False))
-    assert table['scene'] == f'bench_{kind}' and table['fidelity'] == 'analytic'
-    assert len(table['rows']) == len(trial.rows)
-    for row in table['rows']:
-        if row['measured'] is None:
-            assert row['error'] is None and row['claimed']
-        else:
-            assert row['error'] == pytest.approx(row['modelled'] / row['measured'] - 1.0)
-    for claim in table['claims']:
-        assert claim['thesis'] and claim['ours'] and claim['numbers']
-        assert claim['holds'] in (True, False, None)
-    assert table['omitted'] and table['notes']
-    for term in table['omitted']:
-        assert term['reason'] and (term['bound'] is None or 0.0 < term['bound'] < 1.0)
-
-
 @pytest.mark.parametrize(
     'kind, table, message',
     [
@@ -266,17 +204,3 @@ def test_json(kind):
 def test_measurements_that_lack_what_the_bench_needs(tmp_path, kind, table, message):
     with pytest.raises(ConfigError, match=message):
         bench.run(own_scene(tmp_path, kind, table))
-
-
-PRESSED = (
-    'pressure [Pa], force [N], height [mm], depth [mm], contact_radius [mm]\n'
-    '75e3, , 2.0, , \n75e3, 0.08, 1.8, 0.084434, 0.5\n'
-)
-
-
-def test_a_force_that_presses_the_dome_flat_is_refused(tmp_path):
-    """With adhesion 0.527 N flatten the dome; the scene allows forces up to p π r² = 0.530 N."""
-    file = own_scene(tmp_path, 'press', PRESSED, text_forces=None, highest_force=0.529)
-    with pytest.raises(NoEquilibrium, match='cover the whole pad') as caught:
-        bench.run(file)
-    assert caught.value.status == 'flattened'

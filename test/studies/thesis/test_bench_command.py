@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from ros_pad import configuration
-from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.errors import ConfigError
 from studies.thesis.bench_command import main
 
 pytestmark = pytest.mark.slow
@@ -31,27 +31,6 @@ def test_json_and_files(kind, tmp_path, capsys):
         start = pathlib.Path(path).read_bytes()[:4]
         assert start == (b'\x89PNG' if path.endswith('png') else b'%PDF')
     assert json.loads((out / 'summary.json').read_text()) == printed
-
-
-def test_a_bad_scene_leaves_the_name_free(tmp_path):
-    shipped = configuration.shared_folder() / 'scenes' / 'bench_press.yaml'
-    values = yaml.safe_load(shipped.read_text()) | {'pressure': -1.0}
-    scene = tmp_path / 'mine.yaml'
-    scene.write_text(yaml.safe_dump(values))
-    with pytest.raises(ConfigError, match=r'mine\.yaml: pressure = -1\.0'):
-        main([str(scene), '--out', str(tmp_path / 'bench')])
-    assert not (tmp_path / 'bench').exists()
-
-
-def test_nothing_is_overwritten_and_folders_are_numbered(tmp_path, monkeypatch, capsys):
-    (tmp_path / 'bench').mkdir()
-    with pytest.raises(InvalidInput, match='exists already'):
-        main(['bench_inflation', '--out', str(tmp_path / 'bench')])
-    monkeypatch.chdir(tmp_path)
-    for folder in ('bench_inflation', 'bench_inflation_2'):
-        main(['bench_inflation', '--json'])
-        report = json.loads(capsys.readouterr().out)['report']
-        assert pathlib.Path(report).parent == pathlib.Path('runs') / folder
 
 
 def test_a_foot_of_ones_own(tmp_path, capsys):

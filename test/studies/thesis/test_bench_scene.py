@@ -70,16 +70,12 @@ def test_a_walk_is_no_bench_and_a_bench_is_no_walk():
 BAD = [
     ('inflation', 'bench', 'drag', "bench = 'drag' is not allowed: one of inflation, press, tang"),
     ('inflation', 'highest_pressure', 160e3, 'highest_pressure = 160000.0 is not allowed: a numb'),
-    ('inflation', 'pressure', 75e3, "unknown key 'pressure'"),
     ('inflation', 'measurements', 'thesys', "measurements = 'thesys': there is no file"),
     ('press', 'pressure', 91.4e3, 'pressure = 91400.0 is not allowed: a number from 1000 to 913'),
     ('press', 'text_forces.second', ..., "text_forces: key 'second' is missing"),
-    ('tangential', 'dwell', ..., "key 'dwell' is missing"),
     ('tangential', 'floor.receding_angle', 2.2, 'floor: receding_angle = 2.2 is not allowed'),
-    ('tangential', 'design.largest_radius', 1e-4, 'design: largest_radius = 0.0001 is not allo'),
     ('foot', 'criterion', 'measured', "criterion = 'measured': domes of 50000 Pa carry nothing"),
     ('foot', 'highest_load', 3.4, 'highest_load = 3.4 is not allowed: a number from 0.001 to 3.3'),
-    ('foot', 'claimed_highest', 0.1, 'claimed_highest = 0.1 is not allowed'),
 ]
 
 

@@ -77,14 +77,3 @@ def test_paths_that_leave_their_course(walked):
     assert verdicts(walked | straight, 44) == [False, True]
     assert verdicts(walked | straight | {wet: aside(walked[wet], -0.1)}, 44) == [True, True]
     assert verdicts(walked | straight | {dome: aside(walked[dome], 0.1)}, 44) == [False, False]
-
-
-def test_figure_39_ends_at_the_goal(walked):
-    (found,) = walks.draw(walked, (39,))
-    ax = found.drawn.figure.axes[0]
-    shown = {line.get_label(): line.get_xydata() for line in ax.lines}
-    for name, (words, _, _) in walks.RAIL.items():
-        time, way = shown[words].T
-        assert way[-1] == pytest.approx(500.0, abs=1.0)
-        assert time[-1] == pytest.approx(walked[name, 0].metrics.time_to_goal_s, abs=0.005)
-        assert time[0] <= 0.0

@@ -33,8 +33,7 @@ def rows():
 
 @pytest.fixture(scope='module')
 def results(rows):
-    found = [row for row in rows if row.kind == 'result']
-    return {(result.shape, result.family): result for result in found}  # the finest mesh of each
+    return {(result.shape, result.family): result for result in rows}  # the finest mesh of each
 
 
 @pytest.mark.parametrize('row', [0, 7, 14, -2])
@@ -83,28 +82,3 @@ def test_balances_are_off_by_the_documented_amount(results):
         assert thesis.worst_height_error > 3.0 * results[shape.name, 'energy'].worst_height_error
     assert results['truncated cone', 'thesis'].height_error > 1.4
     assert results['cylinder', 'force'].force_error < 0.01 < results['dome', 'force'].force_error
-
-
-def test_traps_are_named(rows):
-    traps = {(t.method, t.given): t for t in rows if t.kind == 'trap'}
-    steep = 'dome, water, θ = 100°'
-    assert traps['thesis', steep].answer == 'dry' and traps['thesis', steep].true.endswith(' mm')
-    assert traps['energy', steep].answer.endswith(' mm')
-    low = 'dome 1.1 mm high, water, γs/γl = 0.8'
-    for balance in capillary.BALANCES:
-        assert traps[balance, low].answer == 'saturated'
-    assert traps[capillary.EXACT, low].answer == 'rim'
-    assert traps['minimised', low].answer.startswith('NoSurface')
-    tall = traps['thesis', 'dome 1.44 mm high, water, γs/γl = 0.7']
-    assert tall.answer == 'saturated' and float(tall.true.removesuffix(' mm')) < 1.44
-    for shape in ('truncated cone', 'cylinder'):
-        for balance in ('thesis', 'force'):
-            assert traps[balance, f'{shape}, water, γs/γl = 0.8'].answer == 'far_off'
-    wide = [trap for trap in traps.values() if trap.given.endswith('9 mm apart')]
-    assert [trap.answer for trap in wide] == ['far_apart'] and wide[0].true.endswith(' mm')
-    slope = traps['energy', 'truncated cone, water, θ = 75°']
-    assert (slope.answer, slope.true) == ('dry', 'no rise')
-    assert traps['energy', 'dome, 1 mN/m, γs/γl = 0.3, 10 layers'].answer == 'coarse'
-    overlaps = [trap for trap in traps.values() if trap.true == 'they overlap']
-    assert len(overlaps) == 2
-    assert all(trap.answer.startswith('MeshError') for trap in overlaps)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
-import math
 import pathlib
 
 import numpy as np
@@ -75,15 +74,6 @@ def test_maps_show_the_wrong_branch_of_general_solvers():
     ours = maps['press'].outcome
     assert set(np.unique(ours)) == {RIGHT, REFUSED}
     assert (maps['brentq, one unknown'].outcome == INVENTED).any()
-
-
-def test_pictures_are_drawn(results, tmp_path):
-    pictures = contact.figures(list(results.values()))
-    assert set(pictures) == {'contact', 'contact_failures'}
-    for name, figure in pictures.items():
-        figure.savefig(tmp_path / f'{name}.png')
-        assert (tmp_path / f'{name}.png').stat().st_size > 20_000
-    assert not math.isnan(pictures['contact'].axes[0].get_xlim()[0])
 
 
 def test_errors_of_the_laws_against_the_measured_pads():

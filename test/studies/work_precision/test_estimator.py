@@ -9,7 +9,7 @@ import pytest
 from ros_pad.estimation import FootEstimator
 from ros_pad.simulation import Scene
 from ros_pad.trials.node_settings import tuning_for
-from studies.work_precision.estimator import conditions, methods, study, tally, walks
+from studies.work_precision.estimator import conditions, methods, tally, walks
 from studies.work_precision.estimator.conditions import Change
 from studies.work_precision.estimator.tally import Tally
 from studies.work_precision.estimator.walks import Recording
@@ -126,7 +126,7 @@ def test_estimates_are_compared_with_the_truth():
     ones = np.ones((1000, 1))
     found = tally.Estimates(
         slipping=ones < 0, standing=ones > 0, fresh=ones > 0, wet=0.2 * ones, mean=0.4 * ones,
-        sd=np.where(wet, 0.04, 0.06), margin=np.where(wet, 0.31, 0.29), speed=ones, updates=1000,
+        sd=np.where(wet, 0.04, 0.06), margin=np.where(wet, 0.31, 0.29),
     )  # fmt: skip
     counts = Tally()
     tally.count_estimates(counts, case, found)
@@ -191,7 +191,7 @@ def test_messages(plain):
     assert np.flatnonzero(slow.arrived[:, 0])[:3].tolist() == [0, 5, 10]
     late = conditions.late_position(plain, 0.02, generator()).position
     assert (late[5:] == plain.position[:-5]).all()
-    assert tally.replay(slow).updates == 6 * 200
+    assert slow.arrived.sum() == 6 * 200
 
 
 # --- the study ----------------------------------------------------------------------------------
@@ -199,15 +199,9 @@ def test_messages(plain):
 
 @pytest.fixture(scope='module')
 def rows():
-    changes = (
-        Change(
-            'position noise', 'm', (1.5e-4, 6e-4), 1.5e-4, conditions.NOT_CONFIGURED,
-            conditions.position_noise,
-        ),
-        Change(
-            'wet friction', '', (0.4,), 0.4, conditions.CONFIGURED,
-            world=conditions.with_wet_friction,
-        ),
+    change = Change(
+        'position noise', 'm', (1.5e-4, 6e-4), 1.5e-4, conditions.NOT_CONFIGURED,
+        conditions.position_noise,
     )  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(walks, 'CYCLES', 2)
@@ -218,7 +212,7 @@ def rows():
         patch.setattr(conditions, 'NOISE_CASES', conditions.NOISE_CASES[:1])
         patch.setattr(methods, 'CUSUM_THRESHOLDS', (4.0,))
         found = methods.compare(walks.recordings(1)[:2], lambda _: None)
-        found += [row for change in changes for row in conditions.stress(change, 1)]
+        found += conditions.stress(change, 1)
         cases = [
             (robot, part, 5, 'flat')
             for part in conditions.WALK_SEEDS
@@ -232,18 +226,16 @@ def test_higher_thresholds_detect_less(rows):
     mine = [row for row in rows if row.part == 'methods']
     assert {row.slips for row in mine} == {mine[0].slips}
     assert mine[0].slips > 10
-    for name in (methods.RATIO, methods.SPEED):
-        misses = [row.misses for row in mine if row.name == name]
-        assert misses == sorted(misses)
+    misses = [row.misses for row in mine if row.name == methods.RATIO]
+    assert misses == sorted(misses)
     shipped = mine[-1]
     assert shipped.shipped
     same = [row for row in mine if row.name == methods.CUSUM and row.value == 4.0]
     assert same[0].misses == pytest.approx(shipped.misses, abs=0.05)
-    assert same[0].us_per_update < shipped.us_per_update
 
 
 def test_noise_that_is_not_configured_is_measured(rows):
-    quiet, loud, _ = [row for row in rows if row.part == 'robustness']
+    quiet, loud = [row for row in rows if row.part == 'robustness']
     assert quiet.shipped and not loud.shipped
     assert quiet.stick_minutes > 0.1
     assert quiet.false_per_minute == loud.false_per_minute == 0.0
@@ -271,15 +263,3 @@ def test_intervals_are_those_of_walks_drawn_anew():
     ]  # fmt: skip
     assert row.intervals['misses'] == pytest.approx(np.quantile(means, [0.025, 0.975]), abs=0.02)
     assert 'coverage' not in row.intervals
-
-
-def test_table_and_pictures(rows, tmp_path):
-    found = study.table(rows)
-    assert 'FootEstimator, alarm' in found
-    assert 'position noise' in found
-    json.dumps([asdict(row) for row in rows], allow_nan=False)
-    pictures = study.figures(rows)
-    assert set(pictures) == {'estimator', 'estimator_robustness'}
-    for name, figure in pictures.items():
-        figure.savefig(tmp_path / f'{name}.png')
-        assert (tmp_path / f'{name}.png').stat().st_size > 20_000

@@ -2,6 +2,7 @@
 import json
 import math
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -47,6 +48,15 @@ def test_kept_errors_fall_with_rings(document):
         errors = [rows[problem, f'{rings} rings'] for rings in (25, 50, 100, 200)]
         assert all(b < 0.4 * a for a, b in pairwise(errors))
         assert rows[problem, 'Stefan-Reynolds'] > 0.9
+
+
+def test_dry_share_by_hand(document):
+    """A rigid film of 0.199 µm on a critical one of 0.5 µm: exp(−(h/h_c)²) = 0.853."""
+    even = SimpleNamespace(
+        radius=np.array([1e-3, 3e-3]), area=np.ones(2), thickness=np.array([[1.99e-7, 1.0]])
+    )
+    assert film.dry_shares(even, 2e-3) == pytest.approx([math.exp(-(0.398**2))])
+    assert document['soles'][-1]['rigid_dry'][0] == pytest.approx(0.853, abs=2e-3)
 
 
 def test_rise_of_a_load_by_hand():

@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from ros_pad.contact.resistance import DISC_TURNING_RADIUS, Foot
-from ros_pad.errors import InvalidInput
+from ros_pad.contact.resistance import DISC_TURNING_RADIUS
 from studies.work_precision import limit_surface
 
 SLIDE, TURN, ABOUT_RIM = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 1.0, 1.0]])
@@ -51,8 +50,3 @@ def test_ellipsoid_is_too_large_and_turns_force_into_moment(disc):
     slip = np.array([1.0, 2.0 / 3.0]) / math.hypot(1.0, 2.0 / 3.0)
     apart = math.hypot(slip[0] - 8.0 / (3.0 * math.pi), slip[1] - 4.0 / (3.0 * math.pi))
     assert apart - 1e-3 < found['motion'] < 0.16
-
-
-def test_what_is_no_checkout_of_the_rival_is_refused(tmp_path):
-    with pytest.raises(InvalidInput, match='a checkout of Gabrieleenx/FrictionModelling'):
-        limit_surface.rivals(limit_surface.domes(Foot.load('large19'), 1), tmp_path)
