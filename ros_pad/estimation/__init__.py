@@ -2,7 +2,7 @@
 """Estimate slip, wetness, friction and friction margin of feet from their forces and motions."""
 
 from ros_pad.estimation.doubt import FAULTS, KINDS
-from ros_pad.estimation.foot import ContactMotion, Estimate, FeetEstimator, FootEstimator
+from ros_pad.estimation.foot import ContactMotion, Estimate, FootEstimator
 from ros_pad.estimation.tuning import SETTINGS, Tuning
 
 DOUBTS = KINDS
@@ -17,7 +17,6 @@ __all__ = [
     'SETTINGS',
     'ContactMotion',
     'Estimate',
-    'FeetEstimator',
     'FootEstimator',
     'Tuning',
 ]

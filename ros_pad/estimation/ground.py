@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ros_pad.contact.resistance import THICK_FILM, Foot
-from ros_pad.estimation import doubt
+from ros_pad.estimation import alarm, doubt
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
-from ros_pad.estimation.scales import FrictionPrior, FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
 if TYPE_CHECKING:
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
 MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
 
+RATIO_NOISE = 0.03
+"""Model error of T/N, added to that of the sensors."""
 
 LONGEST_GAP = 0.15
 """Longest gap between samples of one stance, s: in a longer gap the foot may have stepped."""
@@ -100,7 +101,7 @@ class Ground:
         self._stance = Stance()
         self._footprint: tuple[float, float] | None = None  # of the last stance, m
         self.belief = (tuning.wet_prior, *self.filter.friction)
-        self.quantile = self.filter.quantile(MARGIN_SHARE)
+        self.quantile = float(self.filter.quantile(MARGIN_SHARE))
         self.doubt = Doubt(doubt.NOT_YET)
 
     def touch_down(self, time: float, x: float, y: float, pressure: float) -> None:
@@ -109,7 +110,7 @@ class Ground:
         distance = math.dist(self._footprint or (x, y), (x, y))
         self._footprint = x, y
         self.filter.touch_down(distance, self._stance.dome_share > doubt.DOMED, time)
-        self.quantile = self.filter.quantile(MARGIN_SHARE)
+        self.quantile = float(self.filter.quantile(MARGIN_SHARE))
 
     def lose(self) -> None:
         """Return to the prior, because the sensors are in doubt."""
@@ -151,7 +152,7 @@ class Ground:
         ground, stance = self.filter, self._stance
         self._follow_pressure(time, pressure)
         ground.update(self._evidence(time - window.start, window, place, noises, turning_known))
-        self.quantile = ground.quantile(MARGIN_SHARE)
+        self.quantile = float(ground.quantile(MARGIN_SHARE))
         self.belief = ground.wet_probability, *ground.friction
         self.doubt = doubt.of_ground(
             stance, ground.log_odds, self.belief, window.peak, self.expected_load,
@@ -188,7 +189,7 @@ class Ground:
             share = turning / ratio / self.foot.turning_radius
             force_noise = math.hypot(force_noise, share * tuning.moment_noise)
         sensors = math.hypot(force_noise / math.sqrt(count), offset_sd) / load
-        noise = math.hypot(tuning.ratio_noise, sensors * math.sqrt(1.0 + ratio**2))
+        noise = math.hypot(RATIO_NOISE, sensors * math.sqrt(1.0 + ratio**2))
         stance.peak_ratio = max(stance.peak_ratio, pull)
         stance.peak_turning = max(stance.peak_turning, turning)
         # The error of the body's velocity is the same in the whole window.
@@ -196,12 +197,11 @@ class Ground:
         if tuning.source != 'joints':
             # The mean speed is the displacement of the smoothed contact over the duration. The
             # smoother starts from one sample, so its noise is larger at the start of a stance.
-            spread = 2.0 * duration / (2.0 * tuning.smoothing * count + duration)
+            spread = 2.0 * duration / (2.0 * alarm.SMOOTHING * count + duration)
             if window.first:
                 spread = 0.5 * spread + 1.0
-            speed_noise = math.hypot(
-                tuning.speed_noise, contact_noise * math.sqrt(spread) / duration
-            )
+            marker = contact_noise * math.sqrt(spread) / duration
+            speed_noise = math.hypot(alarm.SPEED_NOISE, marker)
         weight = stance.weight(ratio, noise, *place)
         scales = self._scales(load, stance.dome_share)
         return Evidence(
@@ -223,9 +223,3 @@ class Ground:
             dry / prior.flat_dry if prior.flat_dry else 1.0,
             wet / prior.flat_wet if prior.flat_wet else 1.0,
         )
-
-
-def shared_friction(foot: Foot, expected_load: float, tuning: Tuning) -> FrictionScales:
-    """Return what feet of one robot share of friction, before a walk."""
-    prior = FrictionPrior.of(foot, expected_load)
-    return FrictionScales(prior, tuning.scales, tuning.learn_friction)

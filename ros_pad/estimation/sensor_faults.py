@@ -12,9 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from operator import eq
+from typing import TYPE_CHECKING
 
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
+
+if TYPE_CHECKING:
+    from ros_pad.estimation.track import Sample
 
 PATIENCE = 0.1
 """Time for which a value may stay the same to the last bit, s: markers are sampled more slowly
@@ -147,30 +151,26 @@ class SensorFaults:
             max(a, LEAST) if b else 0.0 for a, b in zip(new, self._noises, strict=True)
         ]
 
-    def update(
-        self, time: float, readings: Sequence[float], age: float, standing: bool, air: float
-    ) -> Doubt | None:
+    def update(self, time: float, sample: Sample, standing: bool, air: float) -> Doubt | None:
         """Process a sample; return why it cannot be used, or None if it can.
 
         Parameters
         ----------
         time : float
             Time of the sample, s.
-        readings : sequence of 6 floats
-            Force, N, and position, m.
-        age : float
-            Age of the position, s.
+        sample : Sample
+            The sample.
         standing : bool
             Whether the foot stood at the sample before: then its position cannot jump.
         air : float
             Height above which the foot touches nothing, m; infinite if it has not stood yet.
         """
-        last, position = self._repeats.last, readings[3:]
-        if not position[2] <= air < math.inf:
+        last, force, position, age = self._repeats.last, sample[:3], sample[4:7], sample.age
+        if not sample.z <= air < math.inf:
             self._grounded = math.inf
         elif self._grounded == math.inf:
             self._grounded = time
-        stopped = self._repeats.update(time, readings)
+        stopped = self._repeats.update(time, force + position)
         # Markers may be sampled more slowly than forces, so speeds need the positions' own times.
         since, self._seen = self._seen, time - age
         leap = 0.0
@@ -184,7 +184,7 @@ class SensorFaults:
         forces = [place for place in stopped if place < 3]
         marker = self._marker_fault(time, age, stopped[len(forces) :], leap, self._seen - since)
         self.marker_valid = not marker
-        return self._force_fault(time, readings[:3], forces) or marker
+        return self._force_fault(time, force, forces) or marker
 
     def _force_fault(
         self, time: float, force: Sequence[float], stopped: Sequence[int]

@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from ros_pad.configuration import Setting
-from ros_pad.contact.resistance import Foot
-from ros_pad.estimation.alarm import THRESHOLD
+from ros_pad.configuration import Setting, choice, instance
 from ros_pad.estimation.scales import CLASSES, SCALE_RANGE, SCALE_SD, SCALE_SD_RANGE, Scale
 
 EXPECTED_LOAD = Setting(
@@ -21,22 +19,10 @@ SOURCES = ('markers', 'joints')
 """Where slip comes from."""
 
 
-def attribute(setting: Setting) -> str:
-    """Return the attribute of :class:`Tuning` that holds a setting."""
-    return setting.name.replace('.', '_')
-
-
 def _field(*given: Any, **more: Any) -> Any:
     """Return a field of a dataclass with a setting."""
     setting = Setting(*given, **more)
     return field(default=setting.default, metadata={'setting': setting})
-
-
-def _described(setting: Setting) -> str:
-    kind = setting.value_type.__name__
-    unit = ', no unit' if kind == 'float' and not setting.unit else ''
-    values = f'Allowed: {setting.allowed}{unit}; default: {setting.default}.'
-    return f'{attribute(setting)} : {kind}\n    {setting.description} {values}\n'
 
 
 @dataclass(frozen=True)
@@ -75,13 +61,6 @@ class Tuning:
         'force_range', 0.0,
         'Largest component of force that a sensor can show; 0: not known.', 'N', 0.0, 1e5,
     )
-    load_gate: float = _field(
-        'load_gate', 0.1, 'Share of the expected load above which a foot stands.',
-        '', 0.001, 1.0,
-    )
-    smoothing: float = _field(
-        'smoothing', 0.02, 'Time constant of the slip speed.', 's', 0.001, 10.0
-    )
     filter_period: float = _field(
         'filter_period', 0.04, 'Time between updates of the wetness and friction filter.',
         's', 0.001, 10.0,
@@ -92,14 +71,6 @@ class Tuning:
     wet_prior: float = _field(
         'wet_prior', 0.5, 'Prior probability of wet ground.', '', 0.01, 0.99,
     )
-    ratio_noise: float = _field(
-        'ratio_noise', 0.03, 'Model error of T/N, added to that of the sensors.', '', 1e-4, 10.0,
-    )
-    speed_noise: float = _field(
-        'speed_noise', 2e-3,
-        'Model error of the slip speed, added to that of the sensors: feet also roll and bend.',
-        'm/s', 1e-6, 1.0,
-    )
     turning_rate: float = _field(
         'turning_rate', 4.0,
         'Root mean square of the rate at which a standing foot turns about the vertical; for legs'
@@ -107,7 +78,7 @@ class Tuning:
         'rad/s', 0.0, 100.0,
     )
     alarm_threshold: float = _field(
-        'alarm.threshold', THRESHOLD,
+        'alarm.threshold', 4.0,
         'Threshold of the slip alarm: on average at least exp(threshold) samples lie between false'
         ' alarms.',
         'nats', 0.1, 100.0,
@@ -128,65 +99,67 @@ class Tuning:
         'Whether the feet learn how much the friction of their floor differs from the contact'
         ' model.',
     )
-    scale_flat_dry: float = _field(
-        'scale.flat_dry', 1.0,
-        'Expected friction over that of the contact model, flat and dry.',
-        '', *SCALE_RANGE,
-    )
-    scale_flat_wet: float = _field(
-        'scale.flat_wet', 1.0,
-        'Expected friction over that of the contact model, flat and wet.',
-        '', *SCALE_RANGE,
-    )
-    scale_dome: float = _field(
-        'scale.dome', 1.0,
-        'Expected friction over that of the contact model, dome.',
-        '', *SCALE_RANGE,
-    )
-    scale_sd_flat_dry: float = _field(
-        'scale_sd.flat_dry', SCALE_SD, 'Standard deviation of the logarithm of scale.flat_dry.',
-        '', *SCALE_SD_RANGE,
-    )
-    scale_sd_flat_wet: float = _field(
-        'scale_sd.flat_wet', SCALE_SD, 'Standard deviation of the logarithm of scale.flat_wet.',
-        '', *SCALE_SD_RANGE,
-    )
-    scale_sd_dome: float = _field(
-        'scale_sd.dome', SCALE_SD, 'Standard deviation of the logarithm of scale.dome.',
-        '', *SCALE_SD_RANGE,
-    )
     # fmt: on
+    scales: Mapping[str, Scale] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        instance('scales', self.scales, Mapping)
+        for name in self.scales:
+            choice('scales', name, CLASSES)
+        object.__setattr__(self, 'scales', dict.fromkeys(CLASSES, Scale()) | dict(self.scales))
+        values = self.values
         for setting in SETTINGS:
-            setting.accept(getattr(self, attribute(setting)))
+            setting.accept(values[setting.name])
 
-    @property
-    def scales(self) -> dict[str, Scale]:
-        """What is known of the scales of friction before a walk, by class."""
-        return {
-            name: Scale(getattr(self, f'scale_{name}'), getattr(self, f'scale_sd_{name}'))
-            for name in CLASSES
-        }
-
-    def rim_speed(self, foot: Foot) -> float:
-        """Return the scrubbing speed of a turning foot at 2/3 of the sole's radius.
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Tuning:
+        """Return the tuning with these values of all settings, by name; others are ignored.
 
         Parameters
         ----------
-        foot : Foot
-            The foot.
+        values : mapping
+            Values by the names of :data:`SETTINGS`.
 
         Returns
         -------
-        float
-            Speed, m/s.
+        Tuning
+            The tuning.
         """
-        return foot.turning_radius * self.turning_rate
+        scales = {n: Scale(values[f'scale.{n}'], values[f'scale_sd.{n}']) for n in CLASSES}
+        own = {attribute: values[each.name] for attribute, each in _OWN.items()}
+        return cls(**own, scales=scales)
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values of all settings by name; :meth:`of` takes them."""
+        return {
+            **{each.name: getattr(self, attribute) for attribute, each in _OWN.items()},
+            **{f'scale.{name}': scale.scale for name, scale in self.scales.items()},
+            **{f'scale_sd.{name}': scale.sd for name, scale in self.scales.items()},
+        }
 
 
-SETTINGS: tuple[Setting, ...] = tuple(each.metadata['setting'] for each in fields(Tuning))
-"""Settings of an estimator; an attribute of :class:`Tuning` has ``_`` in place of a dot."""
+_OWN: dict[str, Setting] = {
+    each.name: each.metadata['setting'] for each in fields(Tuning) if each.metadata
+}
 
-Tuning.__doc__ = f'{inspect.cleandoc(Tuning.__doc__ or "")}\n\nAttributes\n----------\n'
-Tuning.__doc__ += ''.join(map(_described, SETTINGS))
+SETTINGS: tuple[Setting, ...] = (
+    *_OWN.values(),
+    *(
+        Setting(
+            f'scale.{name}', 1.0,
+            f'Expected friction over that of the contact model, {name.replace("_", " and ")}.',
+            '', *SCALE_RANGE,
+        )
+        for name in CLASSES
+    ),
+    *(
+        Setting(
+            f'scale_sd.{name}', SCALE_SD, f'Standard deviation of the logarithm of scale.{name}.',
+            '', *SCALE_SD_RANGE,
+        )
+        for name in CLASSES
+    ),
+)  # fmt: skip
+"""Settings of an estimator, as in parameters, sweeps and replays. An attribute of :class:`Tuning`
+has ``_`` in place of a dot; the last six are in its ``scales``."""

@@ -351,5 +351,5 @@ def run(
         loop.close()
     wall = time.perf_counter() - started
     trial = log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
-    trial.settings['learnt'] = settings_of(loop.pipeline.estimation.estimator.shared)
+    trial.settings['learnt'] = settings_of(loop.pipeline.estimation.model.shared)
     return trial

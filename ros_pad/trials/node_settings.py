@@ -19,7 +19,7 @@ from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
 from ros_pad.errors import BagError, InvalidInput, LimitError, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
-from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
+from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES
 from ros_pad.sensing.stage import SETTINGS as BODY_SETTINGS
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
@@ -209,7 +209,7 @@ class NodeSettings:
     @property
     def tuning(self) -> Tuning:
         """Tuning of the estimators; a yaw moment is used if its noise is above 0."""
-        return Tuning(**{attribute(each): self.values[each.name] for each in SETTINGS})
+        return Tuning.of(self.values)
 
     def controller(self, legs: Sequence[int]) -> MorphologyController:
         """Return a new controller.

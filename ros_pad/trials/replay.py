@@ -24,6 +24,7 @@ from ros_pad.bags import BagReader
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.joining import Joiner
 from ros_pad.pace import TICK_PERIOD_NS, Pace, Progress, part
 from ros_pad.pipeline import Pipeline
@@ -242,7 +243,7 @@ def replay(
         legs=inputs.legs,
         start_ns=bag.start,
         duration_s=(bag.end - bag.start) * 1e-9,
-        samples=dict(zip(inputs.legs, player.stages.estimation.used.tolist(), strict=True)),
+        samples=dict(zip(inputs.legs, player.stages.estimation.used, strict=True)),
         refused=player.refused,
         recorded=recorded,
         replayed=replayed,
@@ -271,7 +272,7 @@ def _outcomes(
     inputs: _Inputs, settings: NodeSettings, recorded: Tracks, replayed: Tracks
 ) -> Iterator[Outcome]:
     values = settings.values
-    gate = values['load_gate'] * values['expected_load']
+    gate = LOAD_GATE * values['expected_load']
     delay_ns = round(2e9 / values['publish_rate'])  # until the estimate of a stance is there
     for place, leg in enumerate(inputs.legs):
         ends = _stance_ends(inputs, place, gate) + delay_ns

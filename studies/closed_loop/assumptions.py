@@ -20,15 +20,16 @@ import inspect
 import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
+from unittest import mock
 
 from matplotlib.figure import Figure
 
 from ros_pad.control import MorphologyController, adaptive, first_morphologies, policy_named
 from ros_pad.control.footprints import Footprints
-from ros_pad.estimation import Tuning
-from ros_pad.estimation.friction import GroundModel
+from ros_pad.estimation import Tuning, alarm, friction, ground, track
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
@@ -44,6 +45,11 @@ LEVEL = 'L2'
 CYCLES = 20
 SEEDS = (0, 1, 2, 3)
 FIXED = ('flat', 'dome')
+CONSTANTS = {
+    'LOAD_GATE': track, 'SMOOTHING': alarm, 'SPEED_NOISE': alarm, 'RATIO_NOISE': ground,
+    'TEMPER': friction,
+}  # fmt: skip
+"""Constants of the estimator that are made wrong, with the modules that hold them."""
 
 
 def defaults(function: Callable[..., Any], *names: str) -> dict[str, Any]:
@@ -61,7 +67,9 @@ class Setup:
     tuning: Tuning = field(default_factory=Tuning)
     limit_error: float = 1.0  # factor on the force limit of the simulated pads
     load_error: float = 1.0  # factor on the load that estimator and controller expect
-    ground: dict[str, Any] = field(default_factory=lambda: defaults(GroundModel, 'temper'))
+    constants: dict[str, float] = field(
+        default_factory=lambda: {name: getattr(module, name) for name, module in CONSTANTS.items()}
+    )
     controller: dict[str, Any] = field(
         default_factory=lambda: defaults(MorphologyController, 'margin', 'lift_off_share')
     )
@@ -115,7 +123,6 @@ ROBOT = 'robots/ch3r.yaml: '
 PATCHES = 'scenes/hexapod_patches.yaml: '
 MODEL = 'regulators/simulated.py: SimulatedRegulator.'
 TUNING = 'estimation/tuning.py: Tuning.'
-FILTER = 'estimation/friction.py: '
 CONTROL = 'control/morphology.py: MorphologyController.'
 POLICY = 'control/policies.py: adaptive.'
 PRINTS = 'control/footprints.py: Footprints.'
@@ -169,15 +176,18 @@ ASSUMPTIONS = (
     Assumption(MODEL + 'dead_band', 'world.regulator.dead_band', 'regulator dead band', ''),
     Assumption(MODEL + 'quantum', 'world.regulator.quantum', 'regulator quantum', 'Pa'),
     Assumption('simulation/scene.py: Scene.expected_load', 'load_error', 'expected load', ''),
-    Assumption(TUNING + 'load_gate', 'tuning.load_gate', 'load gate, estimator', ''),
-    Assumption(TUNING + 'smoothing', 'tuning.smoothing', 'smoothing of speed', 's'),
+    Assumption('estimation/track.py: LOAD_GATE', 'constants.LOAD_GATE', 'load gate, estimator',
+               ''),
+    Assumption('estimation/alarm.py: SMOOTHING', 'constants.SMOOTHING', 'smoothing of speed', 's'),
     Assumption(TUNING + 'filter_period', 'tuning.filter_period', 'filter period', 's'),
     Assumption(TUNING + 'wet_prior', 'tuning.wet_prior', 'wet prior, estimator', '', 'odds'),
     Assumption(TUNING + 'patch_length', 'tuning.patch_length', 'patch length configured', 'm'),
-    Assumption(TUNING + 'ratio_noise', 'tuning.ratio_noise', 'model error of T/N', ''),
-    Assumption(TUNING + 'speed_noise', 'tuning.speed_noise', 'model error of slip speed', 'm/s'),
+    Assumption('estimation/ground.py: RATIO_NOISE',
+               'constants.RATIO_NOISE', 'model error of T/N', ''),
+    Assumption('estimation/alarm.py: SPEED_NOISE',
+               'constants.SPEED_NOISE', 'model error of slip speed', 'm/s'),
     Assumption(TUNING + 'turning_rate', 'tuning.turning_rate', 'turning rate of feet', 'rad/s'),
-    Assumption(FILTER + 'GroundModel.temper', 'ground.temper', 'temper', '', 'odds'),
+    Assumption('estimation/friction.py: TEMPER', 'constants.TEMPER', 'temper', '', 'odds'),
     Assumption(CONTROL + 'margin', 'controller.margin', 'pressure margin', '', 'excess'),
     Assumption(CONTROL + 'lift_off_share',
                'controller.lift_off_share', 'load gate, controller', ''),
@@ -261,6 +271,13 @@ def wrong_by(setup: Setup, assumption: Assumption, factor: float) -> Setup:
 
 def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     """Return the distance a cycle, m, and the verdict, None if the walk is valid."""
+    with ExitStack() as changes:
+        for name, value in setup.constants.items():
+            changes.enter_context(mock.patch.object(CONSTANTS[name], name, value))
+        return _walk(setup, policy, seed)
+
+
+def _walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     world, configured = setup.world, setup.configured
     if setup.limit_error != 1.0:
         # The table of force limits is scaled in a copy of the foot that only the simulation uses.
@@ -277,8 +294,6 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     )
     period_ns = round(setup.control_period * 1e9)
     estimation = EstimationStage(configured.foot, load, tuning, configured.legs, period_ns)
-    # All feet have one model of the ground.
-    estimation.estimator.tracks[0].ground.filter.model.temper = setup.ground['temper']
     choose = policy_named(policy, loop.floor.wet)
     if policy == 'adaptive':
         choose = adaptive(**setup.adaptive)

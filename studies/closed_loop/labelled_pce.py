@@ -21,7 +21,6 @@ import numpy as np
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.alarm import THRESHOLD
 from ros_pad.estimation.foot import ContactMotion, FootEstimator
 from studies import command
 from studies.closed_loop.labelled_contacts import (
@@ -133,7 +132,7 @@ def atlas(recordings: Sequence[Recording]) -> dict[str, Any]:
     for each in recordings:
         score = scores[each.name]
         alarms = {f'{name}, own threshold': (name, thresholds[name]) for name in OWN}
-        alarms |= {f'{name}, as shipped': (name, THRESHOLD) for name in SHIPPED}
+        alarms |= {f'{name}, as shipped': (name, Tuning.alarm_threshold) for name in SHIPPED}
         figures = {}
         for word, (name, threshold) in alarms.items():
             found = alarm_figures(score[name], threshold, each, fewest=1)
@@ -254,7 +253,7 @@ def run(folder: pathlib.Path) -> dict[str, Any]:
     """Return the document of a folder with all six files."""
     recordings = [read_atlas(folder / f'{name}.csv') for name in ATLAS]
     return {
-        'source': SOURCE, 'shipped_threshold': THRESHOLD, 'forget_s': FORGET,
+        'source': SOURCE, 'shipped_threshold': Tuning.alarm_threshold, 'forget_s': FORGET,
         'atlas': atlas(recordings), 'go1': go1(folder),
     }  # fmt: skip
 

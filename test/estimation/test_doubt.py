@@ -12,7 +12,7 @@ import pytest
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import DOUBTS, SENSOR_FAULTS, FootEstimator, Tuning, doubt
-from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior, Scale
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -147,7 +147,7 @@ def test_doubts_are_where_the_errors_are():
         friction = mean * math.exp(random.normal(0.0, math.hypot(0.15, 0.14)))
         demand = random.exponential(0.2)
         slips = demand > friction
-        walk = Walk(seed, scale_sd_flat_dry=0.15, scale_sd_flat_wet=0.15)
+        walk = Walk(seed, scales={'flat_dry': Scale(1.0, 0.15), 'flat_wet': Scale(1.0, 0.15)})
         estimate = walk.stand(min(demand, friction), random.gamma(2.0, 0.04) if slips else 0.0)
         likely = estimate.wet_probability if wet else 1.0 - estimate.wet_probability
         (doubting if estimate.doubt else knowing).append(likely)
