@@ -42,29 +42,16 @@ START = 0.15
 """Assumed time to fill or to vent before it is measured, s: that of the regulator alone."""
 
 
-class RunningMedian:
-    """Median of the last five values: two outliers among them change it little.
+Times = deque[float]
+"""Last times of a kind, s."""
 
-    Parameters
-    ----------
-    start : float
-        Median to be returned before there are three values.
 
-    Attributes
-    ----------
-    value : float
-        The median.
+def typical(times: Times, start: float) -> float:
+    """Return the median of the last five times, s: two outliers among them change it little.
+
+    ``start`` is returned before there are three times.
     """
-
-    def __init__(self, start: float) -> None:
-        self._last: deque[float] = deque(maxlen=5)
-        self.value = start
-
-    def add(self, value: float) -> None:
-        """Add a value and update the median."""
-        self._last.append(value)
-        if len(self._last) >= 3:
-            self.value = statistics.median(self._last)
+    return statistics.median(times) if len(times) >= 3 else start
 
 
 class _Changes:
@@ -74,7 +61,7 @@ class _Changes:
         self.commanded = 0.0  # time of the last change of the set-point
         self.distance = 0.0  # whole pressure change of the fill or vent being timed; 0 for none
         self._filling = False
-        self.fill, self.vent = RunningMedian(START), RunningMedian(START)
+        self.fills, self.vents = Times(maxlen=5), Times(maxlen=5)
 
     def begin(self, time: float, aim: float, pressure: float) -> None:
         """Time the change from a pressure to a set-point if it is more than half of a fill."""
@@ -90,7 +77,7 @@ class _Changes:
             share = 1.0
         else:
             return
-        (self.fill if self._filling else self.vent).add((time - self.commanded) * share)
+        (self.fills if self._filling else self.vents).append((time - self.commanded) * share)
 
 
 class _Motion:
@@ -208,12 +195,12 @@ class PadMonitor:
     @property
     def fill_time(self) -> float:
         """Time from a command until the pad is full, s; median of the last five fills."""
-        return self._changes.fill.value
+        return typical(self._changes.fills, START)
 
     @property
     def vent_time(self) -> float:
         """Time from a command until the pad is flat, s; median of the last five vents."""
-        return self._changes.vent.value
+        return typical(self._changes.vents, START)
 
     @property
     def stalled(self) -> bool:

@@ -37,11 +37,6 @@ class _Leg:
     observed: float = math.nan  # time of the controller's last observation, s
     doubt: float = 0.0  # code of the doubt, if it is a fault of the sensors
 
-    def take_pressure(self, now: float) -> float | None:
-        pressure, self.pressure = self.pressure, None
-        self.observed = now
-        return pressure
-
 
 class DecisionStage:
     """Collect estimates and pressures of all legs; decide at each estimate.
@@ -105,13 +100,18 @@ class DecisionStage:
             if math.isnan(known.observed):
                 known.observed = now
             elif abs(now - known.observed) > TICK_PERIOD_NS * 1e-9:
-                self.controller.observe(leg, now, known.take_pressure(now), known.doubt)
+                self._observe(leg, now)
                 observed = True
         if not observed:
             return None
         before = self._domes
         record = self._command(now_ns, [math.nan] * len(self._legs))
         return record if self._domes != before else None
+
+    def _observe(self, leg: int, now: float) -> None:
+        known = self._legs[leg]
+        self.controller.observe(leg, now, known.pressure, known.doubt)
+        known.pressure, known.observed = None, now
 
     def _decide(self, leg: int, now: float, estimate: tuple[Any, ...]) -> float:
         """Return the set-point of a leg, gauge Pa; NaN if there is none."""
@@ -123,7 +123,7 @@ class DecisionStage:
             known.position, known.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts
             known.doubt = doubt if doubt and doubts.is_fault(doubt) else 0.0
-        self.controller.observe(leg, now, known.take_pressure(now), known.doubt)
+        self._observe(leg, now)
         old = now - known.positioned > OLD
         if old or not math.isfinite(load + wetness + sum(known.position)):
             return math.nan

@@ -16,7 +16,7 @@ from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphol
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
 from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.errors import BagError, InvalidInput, LimitError, reason
+from ros_pad.errors import BagError, InvalidInput, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES
@@ -196,7 +196,7 @@ class NodeSettings:
             if of_policy := _of_policy(values):
                 policy_named(settings.policy, parameters=of_policy)  # raises unless it is adaptive
             settings.controller(settings.legs or (1,))
-        except (InvalidInput, LimitError) as error:
+        except InvalidInput as error:
             given = ', '.join(f'{name}={value}' for name, value in values.items())
             raise InvalidInput(f'{given}: {error}' if given else str(error)) from error
         return settings
