@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ros_pad.estimation.axes import BLOCK, LONGEST, Axes, Vector
 from ros_pad.estimation.ground import LONGEST_GAP
 from ros_pad.estimation.noise import SensorNoise
@@ -99,12 +101,11 @@ class Watch:
             means = [sum(each[earlier:]) / count for each in columns[1:]]
             measured = stands and self.noise.add(columns, means, count)
             if loaded and offset:
-                x, y, fx, fy, _ = means
                 sd = self.noise.position.noise * math.sqrt(2.0 / count)
                 if speed_sd is not None:
                     sd = speed_sd * BLOCK
-                dx, dy = offset
-                self.axes.compare(columns[0][-1], duration, x, y, fx - dx, fy - dy, sd)
+                place, pull = np.array(means[:2]), np.array(means[2:4]) - offset
+                self.axes.compare(columns[0][-1], duration, place, pull, sd)
         if stands and time > self._look_end:
             self.look(time)
         return measured
