@@ -178,7 +178,7 @@ class Ground:
 
     def _unobservable(self, load: float) -> Doubt:
         """Return why this stance with its largest load, N, does not show the ground, if so."""
-        stance, wet_friction = self._stance, self.filter.expected.medians.flat_wet
+        stance, wet_friction = self._stance, self.filter.expected.flat_wet
         if stance.dome_share > ALL_DOMED:
             return Doubt(doubt.ALL_DOME)
         if stance.dome_share > DOMED:

@@ -153,11 +153,9 @@ class Expected:
         self.flat, self.dome, self.undrained = rows[:2], rows[2:4], rows[4]
 
     @cached_property
-    def medians(self) -> FrictionPrior:
-        """Median for each ground and morphology."""
-        return FrictionPrior(
-            *(float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in self.rows[:3])
-        )
+    def flat_wet(self) -> float:
+        """Median for flat feet on wet ground."""
+        return float(np.interp(0.5, np.cumsum(self.flat[1]), EDGES[1:]))
 
 
 class FrictionScales:
