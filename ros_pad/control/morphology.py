@@ -242,8 +242,8 @@ class MorphologyController:
         lift_off = LIFT_OFF.accept(lift_off_share) * expected_load
         touch_down = (lift_off_share + TOUCH_DOWN) * expected_load
         if fixed_pressure is not None:
-            name = f'fixed_pressure (up to the ceiling of {foot.source})'
-            number(name, fixed_pressure, 'Pa', DOME_PRESSURE, foot.ceiling)
+            unit = f'Pa, the ceiling of {foot.source},'
+            number('fixed_pressure', fixed_pressure, unit, DOME_PRESSURE, foot.ceiling)
         self._foot, self._fixed_pressure = foot, fixed_pressure
         self.policy, self.margin = policy, margin
         self.command_timeout = COMMAND_TIMEOUT.accept(command_timeout)

@@ -82,10 +82,10 @@ TABLE = (
     NO_WRENCH, NO_POSITION, REFUSED, NO_VELOCITY,
 ) = range(len(TABLE))  # fmt: skip
 
-KINDS = tuple(dict.fromkeys(each.kind for each in TABLE))
+DOUBTS = tuple(dict.fromkeys(each.kind for each in TABLE))
 """Kinds of doubt; the first one, empty, is no doubt."""
 
-FAULTS = tuple(dict.fromkeys(each.kind for each in TABLE if each.fault))
+SENSOR_FAULTS = tuple(dict.fromkeys(each.kind for each in TABLE if each.fault))
 """Kinds of doubt about sensors, not about the ground."""
 
 

@@ -13,9 +13,9 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.friction import GroundFilter, GroundModel
 from ros_pad.estimation.ground import Ground
-from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.track import Sample, Track, check
 from ros_pad.estimation.tuning import Tuning
+from ros_pad.estimation.watch import Watch
 
 LARGEST_PRESSURE = 1e7
 """Largest size of a gauge pressure, Pa."""
@@ -247,9 +247,9 @@ class FootEstimator:
         return self._track.ground.filter
 
     @property
-    def noise(self) -> SensorNoise:
-        """Configured and measured noise of the sensors."""
-        return self._track.watch.noise
+    def noise(self) -> Watch:
+        """Configured and measured noise of the sensors: its ``position`` and ``force``."""
+        return self._track.watch
 
     def _estimate(self) -> Estimate:
         track = self._track

@@ -161,9 +161,9 @@ class EstimationStage:
         self._pressures = [0.0] * len(legs)
         self.samples = self.last_ns = 0
 
-    def pressure(self, rows: np.ndarray) -> None:
-        """Store gauge pressures of the pads, rows of PRESSURE, unless missing or too large."""
-        for place, gauge in enumerate(rows['pressure'].tolist()):
+    def pressure(self, record: Block) -> None:
+        """Store gauge pressures of a PRESSURE record, unless missing or too large."""
+        for place, gauge in enumerate(record.rows[-1]['pressure'].tolist()):
             if abs(gauge) <= LARGEST_PRESSURE:
                 self._pressures[place] = gauge
 

@@ -14,7 +14,6 @@ from ros_pad.estimation.alarm import BODY_CORRELATION, Slip
 from ros_pad.estimation.axes import BLOCK, Axes, Vector
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.ground import LONGEST_GAP, Ground
-from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.sensor_faults import SensorFaults
 from ros_pad.estimation.watch import Watch
 
@@ -271,7 +270,7 @@ class Track:
         self.ground, self.slip = ground, Slip(ground.foot, tuning)
         memory = BODY_CORRELATION if self._joints else BLOCK
         axes = Axes(load, self.slip.softness, memory)
-        self.watch = Watch(SensorNoise(marker, tuning.force_noise, load), axes)
+        self.watch = Watch(marker, tuning.force_noise, load, axes)
         self._offset, self._heights = Offset(load), Heights()
         self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m
         self._window, self.time, self.stands = Window(0.0), -math.inf, False
@@ -363,9 +362,8 @@ class Track:
         was = watch.axes.doubt.code
         known = (offset.x, offset.y) if offset.known else None
         if watch.end_block(time, sample.z, force, known, self.stands, speed_sd):
-            noise = watch.noise
-            self._faults.set_noise(noise.force.white, noise.position.white)
-            self.slip.set_noise(noise.position.noise, noise.force.noise)
+            self._faults.set_noise(watch.force.white, watch.position.white)
+            self.slip.set_noise(watch.position.noise, watch.force.noise)
         if watch.axes.doubt.code and not was:
             watch.looks = True
             self.ground.forget(time)
@@ -401,7 +399,7 @@ class Track:
             self._heights.last = sample.z
         self.last, self.time = Standing(speed, fx, fy, fz, turning, slipping), time
         if time >= ground.tuning.filter_period + (self._window.start - 1e-9):
-            noises = self.watch.noise.force.noise, self._offset.sd, slip.contact_noise
+            noises = self.watch.force.noise, self._offset.sd, slip.contact_noise
             ground.end_window(time, self._window, place, pressure, noises, known)
             self._window = Window(time, False, self._window.peak)
             self.fresh = True

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from ros_pad.configuration import Setting, choice, instance
@@ -20,8 +20,8 @@ SOURCES = ('markers', 'joints')
 
 
 def _field(*given: Any, **more: Any) -> Any:
-    """Return a field of a dataclass with a setting."""
-    setting = Setting(*given, **more)
+    """Return a field of a dataclass with a setting, which is named after it."""
+    setting = Setting('', *given, **more)
     return field(default=setting.default, metadata={'setting': setting})
 
 
@@ -43,62 +43,37 @@ class Tuning:
 
     # fmt: off
     position_noise: float = _field(
-        'position_noise', 1.5e-4,
-        'Standard deviation of a marker coordinate, until it is measured; 0: readings may repeat.',
-        'm', 0.0, 0.1,
-    )
+        1.5e-4, 'Standard deviation of a marker coordinate, until it is measured; 0: readings may'
+        ' repeat.', 'm', 0.0, 0.1)
     force_noise: float = _field(
-        'force_noise', 0.03,
-        'Standard deviation of a force component, until it is measured; 0: readings may repeat.',
-        'N', 0.0, 100.0,
-    )
+        0.03, 'Standard deviation of a force component, until it is measured; 0: readings may'
+        ' repeat.', 'N', 0.0, 100.0)
     moment_noise: float = _field(
-        'moment_noise', 0.0,
-        'Standard deviation of the torque z of a wrench; 0: the sensors do not measure it.',
-        'N m', 0.0, 10.0,
-    )
+        0.0, 'Standard deviation of the torque z of a wrench; 0: the sensors do not measure it.',
+        'N m', 0.0, 10.0)
     force_range: float = _field(
-        'force_range', 0.0,
-        'Largest component of force that a sensor can show; 0: not known.', 'N', 0.0, 1e5,
-    )
+        0.0, 'Largest component of force that a sensor can show; 0: not known.', 'N', 0.0, 1e5)
     filter_period: float = _field(
-        'filter_period', 0.04, 'Time between updates of the wetness and friction filter.',
-        's', 0.001, 10.0,
-    )
+        0.04, 'Time between updates of the wetness and friction filter.', 's', 0.001, 10.0)
     patch_length: float = _field(
-        'patch_length', 1.5, 'Distance over which wet and dry ground change.', 'm', 0.01, 100.0,
-    )
-    wet_prior: float = _field(
-        'wet_prior', 0.5, 'Prior probability of wet ground.', '', 0.01, 0.99,
-    )
+        1.5, 'Distance over which wet and dry ground change.', 'm', 0.01, 100.0)
+    wet_prior: float = _field(0.5, 'Prior probability of wet ground.', '', 0.01, 0.99)
     turning_rate: float = _field(
-        'turning_rate', 4.0,
-        'Root mean square of the rate at which a standing foot turns about the vertical; for legs'
-        ' without an ankle, the speed of the body over the length of the leg.',
-        'rad/s', 0.0, 100.0,
-    )
+        4.0, 'Root mean square of the rate at which a standing foot turns about the vertical; for'
+        ' legs without an ankle, the speed of the body over the length of the leg.',
+        'rad/s', 0.0, 100.0)
     alarm_threshold: float = _field(
-        'alarm.threshold', 4.0,
-        'Threshold of the slip alarm: on average at least exp(threshold) samples lie between false'
-        ' alarms.',
-        'nats', 0.1, 100.0,
-    )
+        4.0, 'Threshold of the slip alarm: on average at least exp(threshold) samples lie between'
+        ' false alarms.', 'nats', 0.1, 100.0)
     source: str = _field(
-        'source', 'markers',
-        'Where slip comes from: positions of markers, or velocities of contact points with their'
-        ' variances, which a body estimator has from joints and IMU.',
-        choices=SOURCES,
-    )
+        'markers', 'Where slip comes from: positions of markers, or velocities of contact points'
+        ' with their variances, which a body estimator has from joints and IMU.', choices=SOURCES)
     pads_shear: bool = _field(
-        'pads_shear', True,
-        'With source joints: whether pads that shear move the link above them, as on a robot; the'
-        ' joints of simulated robots are those of rigid feet.',
-    )
+        True, 'With source joints: whether pads that shear move the link above them, as on a'
+        ' robot; the joints of simulated robots are those of rigid feet.')
     learn_friction: bool = _field(
-        'learn_friction', True,
-        'Whether the feet learn how much the friction of their floor differs from the contact'
-        ' model.',
-    )
+        True, 'Whether the feet learn how much the friction of their floor differs from the'
+        ' contact model.')
     # fmt: on
     scales: Mapping[str, Scale] = field(default_factory=dict)
 
@@ -140,26 +115,16 @@ class Tuning:
 
 
 _OWN: dict[str, Setting] = {
-    each.name: each.metadata['setting'] for each in fields(Tuning) if each.metadata
+    each.name: replace(each.metadata['setting'], name=each.name.replace('alarm_', 'alarm.'))
+    for each in fields(Tuning)
+    if each.metadata
 }
-
 SETTINGS: tuple[Setting, ...] = (
     *_OWN.values(),
-    *(
-        Setting(
-            f'scale.{name}', 1.0,
-            f'Expected friction over that of the contact model, {name.replace("_", " and ")}.',
-            '', *SCALE_RANGE,
-        )
-        for name in CLASSES
-    ),
-    *(
-        Setting(
-            f'scale_sd.{name}', SCALE_SD, f'Standard deviation of the logarithm of scale.{name}.',
-            '', *SCALE_SD_RANGE,
-        )
-        for name in CLASSES
-    ),
+    *(Setting(f'scale.{name}', 1.0, 'Expected friction over that of the contact model,'
+              f' {name.replace("_", " and ")}.', '', *SCALE_RANGE) for name in CLASSES),
+    *(Setting(f'scale_sd.{name}', SCALE_SD, 'Standard deviation of the logarithm of'
+              f' scale.{name}.', '', *SCALE_SD_RANGE) for name in CLASSES),
 )  # fmt: skip
 """Settings of an estimator, as in parameters, sweeps and replays. An attribute of :class:`Tuning`
 has ``_`` in place of a dot; the last six are in its ``scales``."""

@@ -67,9 +67,7 @@ class EstimatorNode(PadNode):
         self._send = self.record_output(topics.ESTIMATE, self._legs)
         self._keep_pace, self._health_pace = Pace(KEEP_PERIOD_NS), Pace(TICK_PERIOD_NS)
         self.receive_record(topics.SAMPLE, self._legs, self._on_samples)
-        self.receive_record(
-            topics.PRESSURE, self._legs, lambda block: self.stage.pressure(block.rows[-1])
-        )
+        self.receive_record(topics.PRESSURE, self._legs, self.stage.pressure)
         self.on_tick(self._idle)
 
     def _on_samples(self, block: Block) -> None:
@@ -133,7 +131,7 @@ class EstimatorNode(PadNode):
 
     def _foot(self, index: int, row: Any, healthy: bool) -> DiagnosticStatus:
         """Return the health of the sensors of a foot, and its estimate, for ``/diagnostics``."""
-        leg, noise = self._legs[index], self.stage.tracks[index].watch.noise
+        leg, noise = self._legs[index], self.stage.tracks[index].watch
         values = {
             'P(wet)': f'{row["wetness"]:.3f}',
             'friction': f'{row["friction"]:.3f}',

@@ -505,7 +505,7 @@ class _Player:
     def _press(self, stamp_ns: int, rows: np.ndarray) -> None:
         """Process a pressure record."""
         self._tick(stamp_ns)
-        self.stages.estimation.pressure(rows)
+        self.stages.estimation.pressure(Block.of(stamp_ns, rows))
         own = rows.copy()
         own['pressure'][self._apart] = math.nan
         self.stages.decision.pressure(Block.of(stamp_ns, own))

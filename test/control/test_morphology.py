@@ -214,7 +214,9 @@ def test_a_foot_too_heavy_for_domes_stays_flat_with_a_reason():
 
 
 def test_a_fixed_pressure_above_the_ceiling_is_refused_before_anything_moves():
-    with pytest.raises(InvalidInput, match=r'ceiling of large37.* 95000.0 .* to 90000 Pa'):
+    with pytest.raises(
+        InvalidInput, match=r'fixed_pressure = 95000.0 .* to 90000 Pa, the ceiling of large37'
+    ):
         MorphologyController(FOOT, (1,), dome, LOAD, fixed_pressure=95e3)
 
 

@@ -58,7 +58,7 @@ def test_pressures_that_are_no_number_or_too_large_leave_the_last_one():
     stage, rows = Watched().stage, PRESSURE.rows(2)
     for gauge in (60e3, math.nan, 2e7):
         rows['pressure'] = gauge, -gauge
-        stage.pressure(rows)
+        stage.pressure(Block.of(0, rows))
     assert stage._pressures == [60e3, -60e3]
 
 
