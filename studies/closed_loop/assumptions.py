@@ -27,8 +27,13 @@ from unittest import mock
 
 from matplotlib.figure import Figure
 
-from ros_pad.control import MorphologyController, adaptive, first_morphologies, policy_named
-from ros_pad.control.footprints import Footprints
+from ros_pad.control import (
+    MorphologyController,
+    adaptive,
+    first_morphologies,
+    footprints,
+    policy_named,
+)
 from ros_pad.estimation import Tuning, alarm, friction, ground, track
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
@@ -47,9 +52,9 @@ SEEDS = (0, 1, 2, 3)
 FIXED = ('flat', 'dome')
 CONSTANTS = {
     'LOAD_GATE': track, 'SMOOTHING': alarm, 'SPEED_NOISE': alarm, 'RATIO_NOISE': ground,
-    'TEMPER': friction,
+    'TEMPER': friction, 'WET_PRIOR': footprints, 'FADING_LENGTH': footprints, 'KEPT': footprints,
 }  # fmt: skip
-"""Constants of the estimator that are made wrong, with the modules that hold them."""
+"""Constants of estimator and controller that are made wrong, with the modules that hold them."""
 
 
 def defaults(function: Callable[..., Any], *names: str) -> dict[str, Any]:
@@ -77,9 +82,6 @@ class Setup:
         default_factory=lambda: defaults(
             adaptive, 'wet_above', 'dry_below', 'probe_below', 'dwell'
         )
-    )
-    footprints: dict[str, Any] = field(
-        default_factory=lambda: defaults(Footprints, 'wet_prior', 'fading_length', 'memory')
     )
     control_period: float = CONTROL_PERIOD_NS * 1e-9
 
@@ -125,7 +127,7 @@ MODEL = 'regulators/simulated.py: SimulatedRegulator.'
 TUNING = 'estimation/tuning.py: Tuning.'
 CONTROL = 'control/morphology.py: MorphologyController.'
 POLICY = 'control/policies.py: adaptive.'
-PRINTS = 'control/footprints.py: Footprints.'
+PRINTS = 'control/footprints.py: '
 
 # fmt: off
 ASSUMPTIONS = (
@@ -195,9 +197,9 @@ ASSUMPTIONS = (
     Assumption(POLICY + 'dry_below', 'adaptive.dry_below', 'flat below', '', 'odds'),
     Assumption(POLICY + 'probe_below', 'adaptive.probe_below', 'probe below', '', 'odds'),
     Assumption(POLICY + 'dwell', 'adaptive.dwell', 'dwell', 'steps', 'whole'),
-    Assumption(PRINTS + 'wet_prior', 'footprints.wet_prior', 'wet prior, footprints', '', 'odds'),
-    Assumption(PRINTS + 'fading_length', 'footprints.fading_length', 'fading of footprints', 'm'),
-    Assumption(PRINTS + 'memory', 'footprints.memory', 'footprints kept', '', 'whole'),
+    Assumption(PRINTS + 'WET_PRIOR', 'constants.WET_PRIOR', 'wet prior, footprints', '', 'odds'),
+    Assumption(PRINTS + 'FADING_LENGTH', 'constants.FADING_LENGTH', 'fading of footprints', 'm'),
+    Assumption(PRINTS + 'KEPT', 'constants.KEPT', 'footprints kept', '', 'whole'),
     Assumption('pace.py: CONTROL_PERIOD_NS', 'control_period', 'control period', 's'),
 )
 # fmt: on
@@ -306,7 +308,6 @@ def _walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         fixed_pressure=configured.dome_pressure,
         **setup.controller,
     )
-    controller.footprints = Footprints(**setup.footprints)
     loop.connect(controller, period_ns=period_ns)
     loop.pipeline = loop.pipeline._replace(estimation=estimation)
     loops.walk(loop, world)

@@ -77,17 +77,6 @@ def test_slip_pulls_friction_to_the_ratio(ratio):
     assert sd < math.hypot(0.06, 0.12 * ratio**2)
 
 
-@pytest.mark.parametrize('wet_prior', [0.1, 0.5])
-@pytest.mark.parametrize('speed', [0.0, 0.004])
-def test_low_excitation_shows_nothing(wet_prior, speed):
-    """Half a minute at T/N = 0.02, also if speed has a third more noise than assumed."""
-    ground = flat(wet_prior=wet_prior)
-    for sample in range(750):
-        ground.update(Evidence(0.02, 0.03, speed * (-1.0) ** sample, 0.003, DT))
-    odds = ground.wet_probability / (1.0 - ground.wet_probability)
-    assert abs(math.log(odds * (1.0 - wet_prior) / wet_prior)) < 0.6
-
-
 stream = st.lists(
     st.tuples(
         st.floats(0.0, 3.0),  # ratio
