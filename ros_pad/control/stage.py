@@ -7,7 +7,7 @@ The controller node, the loop without ROS and replay use the same class.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,6 @@ import numpy as np
 
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME
-from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt as doubts
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.records import COMMAND, Block
@@ -51,19 +50,10 @@ class DecisionStage:
         Controller of all legs.
     legs : sequence of int
         Numbers of the legs, in the order of the rows of records.
-    reject : callable or None
-        Called with the leg and the error when an estimate is rejected; no set-point follows from
-        it.
     """
 
-    def __init__(
-        self,
-        controller: MorphologyController,
-        legs: Sequence[int],
-        reject: Callable[[int, InvalidInput], None] | None = None,
-    ) -> None:
+    def __init__(self, controller: MorphologyController, legs: Sequence[int]) -> None:
         self.controller = controller
-        self._reject = reject
         self._legs = {leg: _Leg() for leg in legs}
         self._domes: list[bool] = []  # morphologies of the last command
 
@@ -124,15 +114,10 @@ class DecisionStage:
         if not math.isnan(doubt):  # else the last one lasts
             known.doubt = doubt if doubt and doubts.is_fault(doubt) else 0.0
         self._observe(leg, now)
-        old = now - known.positioned > OLD
-        if old or not math.isfinite(load + wetness + sum(known.position)):
+        whole = math.isfinite(load + sum(known.position)) and 0.0 <= wetness <= 1.0
+        if not whole or now - known.positioned > OLD:
             return math.nan
-        try:
-            setpoint = self.controller.update(leg, known.load, wetness, known.position, friction)
-        except InvalidInput as error:
-            if self._reject:
-                self._reject(leg, error)
-            return math.nan
+        setpoint = self.controller.update(leg, known.load, wetness, known.position, friction)
         known.load = -math.inf
         return setpoint
 

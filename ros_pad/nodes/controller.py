@@ -91,7 +91,7 @@ class ControllerNode(PadNode):
         except InvalidInput as error:
             names = 'parameters policy, scene and dome_pressure'
             raise ConfigError(f'node {self.get_name()}: {error} ({names})') from error
-        self.stage = DecisionStage(self.controller, self._legs, self._warn)
+        self.stage = DecisionStage(self.controller, self._legs)
         self._send = self.record_output(topics.COMMAND, self._legs)
         self.receive_record(topics.ESTIMATE, self._legs, self._on_estimate)
         self.receive_record(topics.PRESSURE, self._legs, self.stage.pressure)
@@ -123,11 +123,6 @@ class ControllerNode(PadNode):
             self.get_logger().warning(
                 f'leg {leg} stays flat: {refusal}', throttle_duration_sec=10.0
             )
-
-    def _warn(self, leg: int, error: InvalidInput) -> None:
-        self.get_logger().warning(
-            f'leg {leg}: estimate ignored: {error}', throttle_duration_sec=1.0
-        )
 
     def _tick(self, now_ns: int) -> None:
         """Observe legs without estimates, and publish diagnostics."""

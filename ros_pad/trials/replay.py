@@ -472,7 +472,7 @@ class _Player:
                 settings.foot, settings.values['expected_load'], settings.tuning, legs, period_ns,
                 self._reject,
             ),
-            DecisionStage(settings.controller(legs), legs, self._reject),
+            DecisionStage(settings.controller(legs), legs),
         )  # fmt: skip
         stamps, rows = inputs.streams[COMMAND.name].block
         self._setpoints = dict(zip(stamps.tolist(), rows['setpoint'], strict=True))  # recorded
