@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
 from ros_pad.estimation.scales import CLASSES, GRID, Felt, FrictionPrior, FrictionScales, Scale
 
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
@@ -130,22 +129,3 @@ def test_a_period_has_one_expectation():
     assert not np.array_equal(after, before)
     # After the clock was set back, nothing that was learnt is lost.
     assert np.array_equal(shared.expected(1.0).rows, after)
-
-
-def test_feet_learn_from_one_another():
-    """One foot slips at 0.5 on dry ground; another one, that has felt nothing, expects it."""
-    shared = FrictionScales(PRIOR)
-    feet = [GroundFilter(GroundModel(shared, wet_prior=0.1)) for _ in range(2)]
-    alone = GroundFilter(GroundModel(FrictionScales(PRIOR), wet_prior=0.1))
-    for step in range(12):
-        feet[0].touch_down(1.0, False, float(step))
-        for _ in range(8):
-            feet[0].update(Evidence(0.5, 0.03, 0.1, 0.003, 0.04))
-    for each in (feet[1], alone):
-        each.touch_down(0.0, False, 20.0)
-        each.touch_down(100.0, False, 21.0)  # far from all that it knew
-    dry = shared.scales['flat_dry']
-    assert dry.scale == pytest.approx(0.5 / 0.8, rel=0.1)
-    assert dry.sd < 0.15
-    assert feet[1].quantile(0.5) == pytest.approx(0.5, abs=0.05)
-    assert alone.quantile(0.5) > 0.65
