@@ -121,14 +121,11 @@ class Slip:
         self.contact_noise = math.hypot(position, force * self.softness)
         self.noise = math.hypot(self.contact_noise / SMOOTHING, SPEED_NOISE)
 
-    def _points(self, sample: Sample, fx: float, fy: float) -> tuple[float, float, float, float]:
-        """Return the contact, m, and what is smoothed of it, m; the pads shear under a force."""
-        x, y = sample.x + fx * self._shear, sample.y + fy * self._shear
-        return (x, y, fx * self.softness, fy * self.softness) if self._joints else (x, y, x, y)
-
     def touch_down(self, sample: Sample, fx: float, fy: float) -> tuple[float, float]:
-        """Begin a stance; return the contact, m."""
-        x, y, self._x, self._y = self._points(sample, fx, fy)
+        """Begin a stance; return the contact, m: the pads shear under a force, N."""
+        x, y = sample.x + fx * self._shear, sample.y + fy * self._shear
+        sheared = fx * self.softness, fy * self.softness
+        self._x, self._y = sheared if self._joints else (x, y)
         self.alarm.reset()
         return x, y
 
@@ -141,15 +138,20 @@ class Slip:
         """
         if not 0.0 < dt < math.inf:
             dt = 0.1 * SMOOTHING
-        x, y, to_x, to_y = self._points(sample, fx, fy)
+        x, y = to_x, to_y = sample.x + fx * self._shear, sample.y + fy * self._shear
+        if self._joints:
+            to_x, to_y = fx * self.softness, fy * self.softness
         share = dt / (SMOOTHING + dt)
         self._x += share * (to_x - self._x)
         self._y += share * (to_y - self._y)
-        if not self._joints:
+        self.sd = self.noise
+        along_x, along_y = (to_x - self._x) / SMOOTHING, (to_y - self._y) / SMOOTHING
+        if self._joints:
+            self.sd = math.hypot(self.noise, math.sqrt(sample.variance))
+            along_x, along_y = sample.vx + along_x, sample.vy + along_y
+        else:
             x, y = self._x, self._y
-        self.sd = math.hypot(self.noise, math.sqrt(sample.variance))
-        along = (sample.vx + (to_x - self._x) / SMOOTHING) * fx
-        along += (sample.vy + (to_y - self._y) / SMOOTHING) * fy
+        along = along_x * fx + along_y * fy
         pull = math.sqrt(fx * fx + fy * fy)
         # A foot gives way against its tangential force; the rest of its speed is only noise.
         speed = -along / pull if pull > 0.0 else 0.0

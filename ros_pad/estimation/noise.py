@@ -57,6 +57,7 @@ class Meter:
         variances = [configured * configured] * PRIOR_WINDOWS
         self._variances = deque(variances, maxlen=KEPT_WINDOWS)
         self._ratios = deque([1.0] * PRIOR_WINDOWS, maxlen=KEPT_WINDOWS)
+        self._correlation = 1.0  # variance that counts over that of white noise
         self._step, self._steps = math.inf, 0  # smallest change of a component; number of changes
 
     def add_blocks(self, bend_x: float, bend_y: float, samples: float) -> None:
@@ -65,6 +66,7 @@ class Meter:
         if variance > 0.0:
             square = samples * (bend_x * bend_x + bend_y * bend_y) / 12.0
             self._ratios.append(square / (_MEDIAN * variance))
+            self._correlation = max(1.0, median_high(self._ratios))
 
     def add_changes(self, *components: Sequence[float]) -> None:
         """Look for the steps of the sensor in the readings of each component."""
@@ -80,7 +82,7 @@ class Meter:
         self._variances.append(squares / (6.0 * count * median))
         self.white = math.sqrt(median_high(self._variances))
         least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
-        self.noise = max(least, self.white * math.sqrt(max(1.0, median_high(self._ratios))))
+        self.noise = max(least, self.white * math.sqrt(self._correlation))
 
     def text(self, unit: str) -> str:
         """Return the noise for people, measured and configured."""

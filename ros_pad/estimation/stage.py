@@ -78,7 +78,7 @@ class _Arrivals:
             self.place = x, y
         if fz <= LARGEST_FORCE and not fz <= self.load and fz > -math.inf:
             self.load = fz
-        if math.isnan(fx) or math.isnan(fy) or math.isnan(fz):
+        if fx != fx or fy != fy or fz != fz:  # NaN
             return None
         if self._joints:
             self._miss(doubt.NO_VELOCITY)

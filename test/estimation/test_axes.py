@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import SENSOR_FAULTS, FootEstimator
+from ros_pad.estimation import SENSOR_FAULTS, FootEstimator, doubt
+from ros_pad.estimation.axes import BLOCK, TURNS, Axes
 from ros_pad.estimation.scales import GRID
 
 FOOT = Foot.load('large37')
@@ -145,3 +146,17 @@ def test_the_doubt_ends_when_the_axes_are_mended():
     assert 0.01 < estimate.friction_mean < 2.0 and 0.0 < estimate.wet_probability < 1.0
     scales = walk.estimator.ground.shared.scales
     assert all(math.isfinite(each.scale + each.sd) for each in scales.values())
+
+
+@pytest.mark.parametrize('turned', range(1, 8))
+def test_a_foot_that_sticks_shows_the_turn_by_its_shear(turned):
+    """Its position goes back by force over shear stiffness, in whatever direction it is pulled."""
+    axes, softness, time = Axes(LOAD, 1e-3), 1e-3, 0.0
+    for _ in range(8):
+        for step in range(20):
+            time += BLOCK
+            axes.update(BLOCK, 0.0, (0.0, 0.0, LOAD))
+            true = 2.0 * np.array([math.cos(0.7 * step), math.sin(1.1 * step)])
+            axes.compare(time, BLOCK, -softness * true, TURNS[turned] @ true, 1e-4)
+        axes.update(BLOCK, 0.0, (0.0, 0.0, 0.0))
+    assert axes.doubt[:2] == (doubt.TURNED, turned)

@@ -23,10 +23,10 @@ class Watched:
             lambda leg, error: self.rejected.append((leg, error)),
         )  # fmt: skip
 
-    def sample(self, ms, load=6.0, x=0.0, y=0.0, moment=math.nan):
+    def sample(self, ms, load=6.0, x=0.0, y=0.0, z=0.0, moment=math.nan):
         rows = SAMPLE.rows(2)
         rows['force'][0] = 0.5 + 1e-3 * ms % 7, 0.0, load
-        rows['position'][0], rows['moment'][0] = (x, y, 0.0), moment
+        rows['position'][0], rows['moment'][0] = (x, y, z), moment
         self.emitted += self.stage.process(Block.of(ms * MS, rows))
 
     def shown(self, field):
@@ -70,6 +70,14 @@ def test_moments_count_where_they_are_measured(moments):
     assert (watched.track.last.turning > 0.0) == moments
     watched.sample(12, moment=1e6)
     assert len(watched.rejected) == moments
+
+
+def test_a_moment_read_in_the_air_is_taken_off():
+    watched = Watched(moments=True)
+    for ms in range(4, 2000, 4):
+        load, z = (0.0, 0.015) if 400 < ms < 1600 else (6.0, 0.0)
+        watched.sample(ms, load + 1e-3 * ms % 0.1, z=z + 1e-9 * ms, moment=0.25)
+    assert watched.track.stands and watched.track.last.turning == pytest.approx(0.0, abs=0.1)
 
 
 def test_estimates_are_made_once_a_period_whatever_the_blocks():
