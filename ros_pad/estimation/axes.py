@@ -96,7 +96,7 @@ class Axes:
     def restart(self) -> None:
         """Forget the present stance and the height of the last one."""
         self._stood = math.nan  # mean height of the last stance, m
-        self._lowest, self._highest = math.inf, -math.inf  # since then, m
+        self._swing = math.inf, -math.inf  # lowest and highest position since then, m
         self._loaded = False
         self._begin()
 
@@ -114,7 +114,7 @@ class Axes:
         """
         size = math.hypot(*force)
         if not self._loaded:
-            self._lowest, self._highest = min(self._lowest, height), max(self._highest, height)
+            self._swing = min(self._swing[0], height), max(self._swing[1], height)
             if size > LOADED * self._expected_load:
                 self._loaded = True
                 self._begin()
@@ -195,8 +195,8 @@ class Axes:
         """Compare the heights of a swing, m, with those of the stances before and after it."""
         last = height if math.isnan(self._stood) else self._stood
         lowest, highest = min(height, last), max(height, last)
-        if self._lowest < lowest - BELOW and self._highest < lowest + BELOW:
+        if self._swing[0] < lowest - BELOW and self._swing[1] < lowest + BELOW:
             self._below = min(STANCES, self._below + 1)
-        elif self._highest > highest + BELOW:
+        elif self._swing[1] > highest + BELOW:
             self._below = 0
-        self._stood, self._lowest, self._highest = height, math.inf, -math.inf
+        self._stood, self._swing = height, (math.inf, -math.inf)
