@@ -35,7 +35,7 @@ class Pipeline(NamedTuple):
 
     def pressure(self, record: Block) -> None:
         """Process a pressure record: it counts for later samples and decisions."""
-        self.estimation.pressure(record.rows[-1])
+        self.estimation.pressure(record)
         self.decision.pressure(record)
 
     def tick(self, now_ns: int) -> Block | None:

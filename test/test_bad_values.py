@@ -52,8 +52,6 @@ CASES = (
     (sample, (), {'joint_velocities': None}),
     (estimation.FootEstimator, ('large19', 5.0), 'foot'),
     (estimation.FootEstimator, (FOOT, 5.0, {'wet_prior': 0.2}), 'tuning'),
-    (estimation.FeetEstimator, (6.0, FOOT, 5.0, estimation.Tuning()), 'count'),
-    (estimation.FeetEstimator, (6, FOOT, 5.0, 'default'), 'tuning'),
     (control.first_morphologies, ('adaptiv', [1, 2]), 'policy'),
     (control.dome_pressure, ('large19', 5.0, 1.2), 'foot'),
     (control.dome_pressure, (FOOT, -5.0, 1.2), 'load'),

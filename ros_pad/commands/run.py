@@ -27,7 +27,7 @@ from ros_pad.configuration import integer, number
 from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import ConfigError, InvalidInput, PadError
-from ros_pad.estimation.tuning import SOURCES
+from ros_pad.estimation.tuning import SOURCES, Tuning
 from ros_pad.signals import INTERRUPTED, STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.robot import check_reach
@@ -90,8 +90,7 @@ def run(options: argparse.Namespace) -> int:
     options.tuning = tuning_for(scene, options.sensing)
     if options.learnt is not None:
         known = learnt.load(options.learnt, scene.foot.source)
-        changes = {name.replace('.', '_'): value for name, value in known.items()}
-        options.tuning = dataclasses.replace(options.tuning, **changes)
+        options.tuning = Tuning.of(options.tuning.values | known)
     integer('--seed', options.seed, 0, 2**31 - 1)
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'

@@ -5,7 +5,6 @@ from ros_pad.control.monitor import PadMonitor
 from ros_pad.control.morphology import COMMAND_TIMEOUT, FootFault, MorphologyController
 from ros_pad.control.policies import (
     POLICIES,
-    POLICY_PARAMETERS,
     Choice,
     LiftOff,
     adaptive,
@@ -20,7 +19,6 @@ from ros_pad.control.pressure import dome_pressure
 __all__ = [
     'COMMAND_TIMEOUT',
     'POLICIES',
-    'POLICY_PARAMETERS',
     'Choice',
     'FootFault',
     'LiftOff',

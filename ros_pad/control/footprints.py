@@ -9,9 +9,17 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from ros_pad.configuration import number
 from ros_pad.contact.resistance import Foot, expected_friction
 from ros_pad.estimation import Tuning
+
+WET_PRIOR = Tuning.wet_prior
+"""Prior probability P0 of wet ground."""
+
+FADING_LENGTH = 1.0
+"""Distance ℓ over which footprints fade, m."""
+
+KEPT = 60
+"""Number of footprints that are kept."""
 
 DRY = 0.35
 """Probability of wet ground below which the friction of a flat foot is that of dry ground."""
@@ -31,29 +39,10 @@ class Footprints:
     With the distance d from a footprint, the probability fades to the prior as in a two-state
     Markov chain of patches, P(d) = P0 + (P - P0) exp(-d / ℓ). Only the footprint whose P(d) is
     farthest from P0 counts, and of equally far ones the last.
-
-    Parameters
-    ----------
-    wet_prior : float
-        Prior probability P0 of wet ground, 0 to 1.
-    fading_length : float
-        ℓ, m, above 0.
-    memory : int
-        Number of footprints that are kept, 1 or more.
-
-    Raises
-    ------
-    InvalidInput
-        When a value is outside its range; the message names it.
     """
 
-    def __init__(
-        self, wet_prior: float = Tuning.wet_prior, fading_length: float = 1.0, memory: int = 60
-    ) -> None:
-        self._wet_prior = number('wet_prior', wet_prior, '(probability)', high=1.0)
-        self.fading_length = number('fading_length', fading_length, 'm', above=True)
-        number('memory', memory, 'footprints', low=1.0)
-        self._prints: deque[tuple[float, float, float]] = deque(maxlen=memory)
+    def __init__(self) -> None:
+        self._prints: deque[tuple[float, float, float]] = deque(maxlen=KEPT)
 
     def add(self, x: float, y: float, wet_probability: float) -> None:
         """Add a footprint of a flat foot.
@@ -65,16 +54,16 @@ class Footprints:
         wet_probability : float
             Probability of wet ground that the foot has estimated, 0 to 1.
         """
-        self._prints.append((x, y, wet_probability - self._wet_prior))
+        self._prints.append((x, y, wet_probability - WET_PRIOR))
 
     def wet_probability(self, x: float, y: float) -> float:
         """Return the probability that the ground is wet at a position, m."""
         best = 0.0
         for at_x, at_y, excess in self._prints:
-            faded = excess * math.exp(-math.hypot(x - at_x, y - at_y) / self.fading_length)
+            faded = excess * math.exp(-math.hypot(x - at_x, y - at_y) / FADING_LENGTH)
             if abs(faded) >= abs(best):
                 best = faded
-        return self._wet_prior + best
+        return WET_PRIOR + best
 
 
 class FrictionFelt:

@@ -42,55 +42,37 @@ START = 0.15
 """Assumed time to fill or to vent before it is measured, s: that of the regulator alone."""
 
 
-class RunningMedian:
-    """Median of the last five values: two outliers among them change it little.
+Times = deque[float]
+"""Last times of a kind, s."""
 
-    Parameters
-    ----------
-    start : float
-        Median to be returned before there are three values.
 
-    Attributes
-    ----------
-    value : float
-        The median.
+def typical(times: Times, start: float) -> float:
+    """Return the median of the last five times, s: two outliers among them change it little.
+
+    ``start`` is returned before there are three times.
     """
-
-    def __init__(self, start: float) -> None:
-        self._last: deque[float] = deque(maxlen=5)
-        self.value = start
-
-    def add(self, value: float) -> None:
-        """Add a value and update the median."""
-        self._last.append(value)
-        if len(self._last) >= 3:
-            self.value = statistics.median(self._last)
+    return statistics.median(times) if len(times) >= 3 else start
 
 
 class _Changes:
-    """Times that fills and vents take, from the command to the set-point."""
+    """Times that whole fills and vents take, from the command to the set-point."""
 
     def __init__(self) -> None:
         self.commanded = 0.0  # time of the last change of the set-point
-        self.distance = 0.0  # whole pressure change of the fill or vent being timed; 0 for none
+        self.timed = False  # whether a fill or vent is being timed
         self._filling = False
-        self.fill, self.vent = RunningMedian(START), RunningMedian(START)
+        self.fills, self.vents = Times(maxlen=5), Times(maxlen=5)
 
-    def begin(self, time: float, aim: float, pressure: float) -> None:
+    def begin(self, time: float, aim: float, pressure: float, tolerance: float) -> None:
         """Time the change from a pressure to a set-point if it is more than half of a fill."""
         self.commanded, self._filling = time, aim > pressure
-        distance = abs(aim - pressure)
-        self.distance = distance if distance > 0.5 * max(aim, pressure) else 0.0
+        self.timed = abs(aim - pressure) > max(0.5 * max(aim, pressure), 2.0 * tolerance)
 
-    def learn(self, time: float, left: float, tolerance: float) -> None:
-        """Learn from a change of which a pressure is left; it is assumed to be exponential."""
-        if left > tolerance and left < 0.8 * self.distance:
-            share = math.log(self.distance / tolerance) / math.log(self.distance / left)
-        elif left <= tolerance and self.distance > 2.0 * tolerance:
-            share = 1.0
-        else:
-            return
-        (self.fill if self._filling else self.vent).add((time - self.commanded) * share)
+    def end(self, time: float) -> None:
+        """End the change: the pad has arrived."""
+        if self.timed:
+            (self.fills if self._filling else self.vents).append(time - self.commanded)
+        self.timed = False
 
 
 class _Motion:
@@ -208,12 +190,12 @@ class PadMonitor:
     @property
     def fill_time(self) -> float:
         """Time from a command until the pad is full, s; median of the last five fills."""
-        return self._changes.fill.value
+        return typical(self._changes.fills, START)
 
     @property
     def vent_time(self) -> float:
         """Time from a command until the pad is flat, s; median of the last five vents."""
-        return self._changes.vent.value
+        return typical(self._changes.vents, START)
 
     @property
     def stalled(self) -> bool:
@@ -249,8 +231,6 @@ class PadMonitor:
         if setpoint is None:
             self._wait(time)
         elif not abs(aim - last) <= self.tolerance:  # also the first one
-            if not math.isnan(last):
-                self._changes.learn(before, abs(last - self.pressure), self.tolerance)
             self._set_out(before, aim, self.pressure)
         if not math.isfinite(reading):
             silent = time - self._read
@@ -271,11 +251,11 @@ class PadMonitor:
         """Begin a pressure change."""
         self._arrived = False
         self._wait(time)
-        self._changes.begin(time, aim, pressure)
+        self._changes.begin(time, aim, pressure, self.tolerance)
 
     def _wait(self, time: float) -> None:
         """Restart the comparison of readings with the set-point."""
-        self._changes.distance, self._repair.right = 0.0, math.inf
+        self._changes.timed, self._repair.right = False, math.inf
         self._motion.restart(time)
 
     def _judge(self, time: float, aim: float, last_read: float) -> None:
@@ -284,8 +264,8 @@ class PadMonitor:
         repair.highest = max(repair.highest, pressure)
         over = pressure > self._ceiling + tolerance
         if abs(pressure - aim) <= tolerance and not over:
-            self._changes.learn(time, 0.0, tolerance)
-            self._changes.distance, self._arrived = 0.0, True
+            self._changes.end(time)
+            self._arrived = True
             self._motion.restart(time)
             if self.fault and repair.done(time, aim, pressure, tolerance):
                 self.fault = None
@@ -295,7 +275,7 @@ class PadMonitor:
             self._find_fault(time, aim, over)
 
     def _find_fault(self, time: float, aim: float, over: bool) -> None:
-        self._changes.distance = 0.0
+        self._changes.timed = False
         pressure, repair = self.pressure, self._repair
         side = 1 if pressure > aim or over else -1
         if pressure < -self.tolerance:

@@ -13,13 +13,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ros_pad.configuration import Setting, instance, number
-from ros_pad.configuration import choice as one_of
+from ros_pad.configuration import Setting, choice, instance, number, quantity
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.faults import Fault, Kind, joined
 from ros_pad.control.footprints import Footprints, FrictionFelt
-from ros_pad.control.monitor import PadMonitor, RunningMedian
+from ros_pad.control.monitor import PadMonitor, Times, typical
 from ros_pad.control.policies import DOME, FLAT, Choice, LiftOff, Policy
 from ros_pad.control.pressure import dome_pressure
 from ros_pad.errors import InvalidInput, LimitError
@@ -51,37 +50,6 @@ TOUCH_DOWN = 0.3
 noise does not count as steps. Nor does the bounce of a landing foot, which touches the ground with
 up to 0.55 of its load (0.8 on rough ground) and has little load again until the other tripod lifts
 off."""
-
-
-class LoadGate:
-    """Decide from its load whether a foot stands, with hysteresis.
-
-    Parameters
-    ----------
-    expected_load : float
-        Normal force in stance, N, above 0.
-    share : float
-        Share of that load below which a standing foot has lifted off, above 0 up to 1.
-    hysteresis : float
-        Additional share of that load from which on the foot stands again, 0 or more.
-
-    Attributes
-    ----------
-    lift_off, touch_down : float
-        Loads at which the foot lifts off and touches down, N.
-    standing : bool
-        Whether the foot stands.
-    """
-
-    def __init__(self, expected_load: float, share: float, hysteresis: float = 0.0) -> None:
-        self.lift_off = share * expected_load
-        self.touch_down = (share + hysteresis) * expected_load
-        self.standing = False
-
-    def update(self, load: float) -> bool:
-        """Process a load, N; return whether the foot stands."""
-        self.standing = load >= (self.lift_off if self.standing else self.touch_down)
-        return self.standing
 
 
 @dataclass
@@ -122,13 +90,15 @@ class FootFault:
 class _Ground:
     """Load, positions and times of a foot in this stance and in the one before."""
 
-    gate: LoadGate
+    lift_off: float  # load below which a standing foot has lifted off, N
+    touch_down: float  # load from which on it stands again, N
     peak: float  # largest recent load, N, for which the pressure of domes is chosen
+    stands: bool = False
     largest: float = 0.0  # largest load of this stance, N
     stood: tuple[float, float] = (0.0, 0.0)  # last position in stance, m
     lifted: tuple[float, float] | None = None  # position at the last lift-off, m
     lifted_at: float = math.nan  # time of that, s
-    swing: RunningMedian = field(default_factory=lambda: RunningMedian(math.inf))  # duration, s
+    swings: Times = field(default_factory=lambda: Times(maxlen=5))  # durations, s
 
 
 @dataclass(slots=True)
@@ -231,9 +201,8 @@ class MorphologyController:
     Raises
     ------
     InvalidInput
-        When a value is outside its range, or foot or policy of another kind; the message names it.
-    LimitError
-        When the fixed pressure is above the foot's ceiling.
+        When a value is outside its range, a fixed pressure above the foot's ceiling, or foot or
+        policy of another kind; the message names it.
 
     Examples
     --------
@@ -268,16 +237,13 @@ class MorphologyController:
         number('expected_load', expected_load, 'N', above=True)
         first = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
         for leg in legs:
-            one_of('start', first.get(leg, f'no morphology of leg {leg}'), (FLAT, DOME))
+            choice('start', first.get(leg, f'no morphology of leg {leg}'), (FLAT, DOME))
         number('margin', margin, '(factor)', above=True)
-        LIFT_OFF.accept(lift_off_share)
+        lift_off = LIFT_OFF.accept(lift_off_share) * expected_load
+        touch_down = (lift_off_share + TOUCH_DOWN) * expected_load
         if fixed_pressure is not None:
-            number('fixed_pressure', fixed_pressure, 'Pa', low=DOME_PRESSURE)
-            if fixed_pressure > foot.ceiling:
-                raise LimitError(
-                    f'fixed_pressure = {fixed_pressure:g} Pa is above the ceiling of'
-                    f' {foot.ceiling:g} Pa of {foot.source}'
-                )
+            unit = f'Pa, the ceiling of {foot.source},'
+            number('fixed_pressure', fixed_pressure, unit, DOME_PRESSURE, foot.ceiling)
         self._foot, self._fixed_pressure = foot, fixed_pressure
         self.policy, self.margin = policy, margin
         self.command_timeout = COMMAND_TIMEOUT.accept(command_timeout)
@@ -289,8 +255,8 @@ class MorphologyController:
         self.underpressure = dict.fromkeys(legs, 0)
         self._legs: dict[int, _LegState] = {}
         for leg in legs:
-            gate = LoadGate(expected_load, lift_off_share, TOUCH_DOWN)
-            ground, air = _Ground(gate, 1.5 * expected_load), _Air(PadMonitor(foot.ceiling))
+            ground = _Ground(lift_off, touch_down, peak=1.5 * expected_load)
+            air = _Air(PadMonitor(foot.ceiling))
             self._legs[leg] = _LegState(leg, ground, air, first[leg])
             self._apply(self._legs[leg], Choice(first[leg]))
 
@@ -384,7 +350,7 @@ class MorphologyController:
             For a leg that is not controlled.
         """
         state, slow = self._state(leg), ''
-        fill, swing = state.air.monitor.fill_time, state.ground.swing.value
+        fill, swing = state.air.monitor.fill_time, typical(state.ground.swings, math.inf)
         if fill > swing:
             slow = f'slow hose: a fill takes {fill:.2f} s, a swing {swing:.2f} s'
         return joined(self.refusals.get(leg), state.air.shortfall, slow)
@@ -509,19 +475,16 @@ class MorphologyController:
             finite. The state is then unchanged.
         """
         state = self._state(leg)
-        # Comparisons with NaN are False, so a load of NaN would count as a lift-off.
-        if not (math.isfinite(load + position[0] + position[1]) and 0.0 <= wet_probability <= 1.0):
-            raise InvalidInput(
-                f'leg {leg}: load = {load!r} N and position = {tuple(position)!r} m must be'
-                f' finite, and wet_probability = {wet_probability!r} must be from 0 to 1; at least'
-                ' one is not'
-            )
+        number(f'leg {leg}: load', load, 'N', -math.inf)
+        quantity(f'leg {leg}: position', position, 'm', -math.inf)
+        number(f'leg {leg}: wet_probability', wet_probability, '', high=1.0)
         state.updated = state.now
-        ground, gate = state.ground, state.ground.gate
-        stood = gate.standing
-        if gate.update(load) and not stood:
+        ground = state.ground
+        stood = ground.stands
+        ground.stands = load >= (ground.lift_off if stood else ground.touch_down)
+        if ground.stands and not stood:
             self._touch_down(state)
-        if load >= gate.lift_off:
+        if load >= ground.lift_off:
             ground.largest = max(ground.largest, load)
             ground.stood = (position[0], position[1])
         elif stood:
@@ -536,7 +499,7 @@ class MorphologyController:
         if ground.lifted is None:
             return  # the foot stood from the beginning: this is no step
         if state.now > ground.lifted_at:
-            ground.swing.add(state.now - ground.lifted_at)
+            ground.swings.append(state.now - ground.lifted_at)
         pressure = air.monitor.pressure
         if state.morphology == DOME and pressure < air.needed:
             self.underpressure[state.leg] += 1
@@ -544,24 +507,24 @@ class MorphologyController:
                 f'{1e-3 * pressure:.1f} kPa at touch-down, {1e-3 * air.needed:.1f} kPa needed'
             )
 
-    def _permitted(self, state: _LegState, choice: Choice) -> Choice:
+    def _permitted(self, state: _LegState, wanted: Choice) -> Choice:
         """Return the choice, changed where faults of sensors or air do not permit it.
 
         After a fault of its air a leg is flat, except when a dome is tried.
         """
         air, monitor = state.air, state.air.monitor
-        if state.sensors and choice.probe and choice.morphology == FLAT:
-            choice = Choice(state.morphology)  # a probe without sensors would measure nothing
+        if state.sensors and wanted.probe and wanted.morphology == FLAT:
+            wanted = Choice(state.morphology)  # a probe without sensors would measure nothing
         if not monitor.fault:
             air.trying = False
             # A silent device keeps its pressure; a new set-point would act when it answers again.
-            return Choice(state.morphology) if monitor.silence else choice
-        if choice.morphology == FLAT or monitor.silence:
+            return Choice(state.morphology) if monitor.silence else wanted
+        if wanted.morphology == FLAT or monitor.silence:
             air.trying = False
             return Choice(FLAT)
         if air.trying:
             if not monitor.stalled:
-                return choice  # the pad may still be filling through a slow hose
+                return wanted  # the pad may still be filling through a slow hose
             air.trying = False
             air.patience = min(2 * air.patience, LONGEST_WAIT)
             air.wait = air.patience
@@ -572,7 +535,7 @@ class MorphologyController:
         if air.wait > 0 or (air.wait == 0 and any(other.trying for other in others)):
             return Choice(FLAT)
         air.trying = True
-        return choice
+        return wanted
 
     def _lift_off(
         self, state: _LegState, wet: float, position: Sequence[float], friction: float
@@ -615,12 +578,12 @@ class MorphologyController:
             self.switches[state.leg] += 1
             state.steps = 0
 
-    def _apply(self, state: _LegState, choice: Choice) -> None:
+    def _apply(self, state: _LegState, wanted: Choice) -> None:
         """Apply a choice; make the leg flat if no pressure up to the ceiling carries the load."""
         air, peak = state.air, state.ground.peak
-        state.morphology, state.setpoint, state.probing = choice.morphology, 0.0, choice.probe
+        state.morphology, state.setpoint, state.probing = wanted.morphology, 0.0, wanted.probe
         self.refusals.pop(state.leg, None)
-        if choice.morphology == FLAT:
+        if wanted.morphology == FLAT:
             return
         try:
             if self._fixed_pressure:

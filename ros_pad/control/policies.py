@@ -242,9 +242,6 @@ def first_morphologies(policy: str, legs: Sequence[int]) -> dict[int, str]:
 POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
 """Names of the policies."""
 
-POLICY_PARAMETERS = tuple(_DEFAULTS)
-"""Names of the parameters of the adaptive policy."""
-
 
 def policy_named(
     name: str,
@@ -284,5 +281,5 @@ def policy_named(
             raise InvalidInput("policy = 'oracle' needs the map of the floor (is_wet)")
         return oracle(is_wet)
     for parameter in parameters or ():
-        choice('parameter of the adaptive policy', parameter, POLICY_PARAMETERS)
+        choice('parameter of the adaptive policy', parameter, tuple(_DEFAULTS))
     return {'flat': flat, 'dome': dome}.get(name) or adaptive(**(parameters or {}))

@@ -47,18 +47,18 @@ def dome_pressure(foot: Foot, load: float, margin: float) -> float:
     """
     instance('foot', foot, Foot)
     number('load', load, 'N')
+    number('margin', margin, '(factor)', above=True)
+    asked = f'{load:.3g} N with margin {margin:g} on {foot.pads} pads of {foot.source}'
     try:
         wanted = float(pressure_for(foot.pad, load / foot.pads, foot.limit, margin=margin))
     except NoEquilibrium as error:
         raise LimitError(
-            f'{load:.3g} N with margin {margin:g} on {foot.pads} pads of {foot.source} is more'
-            f' than domes carry at any pressure up to the ceiling of {foot.ceiling:.0f} Pa'
+            f'{asked} is more than domes carry at any pressure up to the ceiling of'
+            f' {foot.ceiling:.0f} Pa'
         ) from error
     # Rounding up keeps the margin. Rounding errors of `wanted` must not add a whole step.
     pressure = RESOLUTION * math.ceil(wanted / RESOLUTION - 1e-6)
     if pressure > foot.ceiling:
-        raise LimitError(
-            f'{load:.3g} N with margin {margin:g} on {foot.pads} pads of {foot.source} needs'
-            f' {pressure:.0f} Pa, above the ceiling of {foot.ceiling:.0f} Pa'
-        )
+        above = f'{pressure:.0f} Pa, above the ceiling of {foot.ceiling:.0f} Pa'
+        raise LimitError(f'{asked} needs {above}')
     return pressure

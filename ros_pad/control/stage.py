@@ -7,7 +7,7 @@ The controller node, the loop without ROS and replay use the same class.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,6 @@ import numpy as np
 
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME
-from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt as doubts
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.records import COMMAND, Block
@@ -37,11 +36,6 @@ class _Leg:
     observed: float = math.nan  # time of the controller's last observation, s
     doubt: float = 0.0  # code of the doubt, if it is a fault of the sensors
 
-    def take_pressure(self, now: float) -> float | None:
-        pressure, self.pressure = self.pressure, None
-        self.observed = now
-        return pressure
-
 
 class DecisionStage:
     """Collect estimates and pressures of all legs; decide at each estimate.
@@ -56,19 +50,10 @@ class DecisionStage:
         Controller of all legs.
     legs : sequence of int
         Numbers of the legs, in the order of the rows of records.
-    reject : callable or None
-        Called with the leg and the error when an estimate is rejected; no set-point follows from
-        it.
     """
 
-    def __init__(
-        self,
-        controller: MorphologyController,
-        legs: Sequence[int],
-        reject: Callable[[int, InvalidInput], None] | None = None,
-    ) -> None:
+    def __init__(self, controller: MorphologyController, legs: Sequence[int]) -> None:
         self.controller = controller
-        self._reject = reject
         self._legs = {leg: _Leg() for leg in legs}
         self._domes: list[bool] = []  # morphologies of the last command
 
@@ -105,13 +90,18 @@ class DecisionStage:
             if math.isnan(known.observed):
                 known.observed = now
             elif abs(now - known.observed) > TICK_PERIOD_NS * 1e-9:
-                self.controller.observe(leg, now, known.take_pressure(now), known.doubt)
+                self._observe(leg, now)
                 observed = True
         if not observed:
             return None
         before = self._domes
         record = self._command(now_ns, [math.nan] * len(self._legs))
         return record if self._domes != before else None
+
+    def _observe(self, leg: int, now: float) -> None:
+        known = self._legs[leg]
+        self.controller.observe(leg, now, known.pressure, known.doubt)
+        known.pressure, known.observed = None, now
 
     def _decide(self, leg: int, now: float, estimate: tuple[Any, ...]) -> float:
         """Return the set-point of a leg, gauge Pa; NaN if there is none."""
@@ -123,16 +113,11 @@ class DecisionStage:
             known.position, known.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts
             known.doubt = doubt if doubt and doubts.is_fault(doubt) else 0.0
-        self.controller.observe(leg, now, known.take_pressure(now), known.doubt)
-        old = now - known.positioned > OLD
-        if old or not math.isfinite(load + wetness + sum(known.position)):
+        self._observe(leg, now)
+        whole = math.isfinite(load + sum(known.position)) and 0.0 <= wetness <= 1.0
+        if not whole or now - known.positioned > OLD:
             return math.nan
-        try:
-            setpoint = self.controller.update(leg, known.load, wetness, known.position, friction)
-        except InvalidInput as error:
-            if self._reject:
-                self._reject(leg, error)
-            return math.nan
+        setpoint = self.controller.update(leg, known.load, wetness, known.position, friction)
         known.load = -math.inf
         return setpoint
 

@@ -9,8 +9,8 @@ does none of these. Each stance, or second of a long one, is a witness, and no s
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from operator import add
+
+import numpy as np
 
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
@@ -54,55 +54,15 @@ least."""
 STANCES = 2
 """Witnesses of a wrong normal axis, or swings below stances, that make a doubt."""
 
-Matrix = tuple[float, float, float, float]
-
-TURNS: tuple[Matrix, ...] = (
-    (1.0, 0.0, 0.0, 1.0), (0.0, -1.0, 1.0, 0.0), (0.0, 1.0, -1.0, 0.0), (-1.0, 0.0, 0.0, -1.0),
-    (-1.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, -1.0), (0.0, 1.0, 1.0, 0.0), (0.0, -1.0, -1.0, 0.0),
-)  # fmt: skip
-"""For each turn of :data:`ros_pad.estimation.doubt.TURNS`, the matrix (by rows) from the true
-horizontal force to the measured one."""
+TURNS = np.array((
+    ((1.0, 0.0), (0.0, 1.0)), ((0.0, -1.0), (1.0, 0.0)), ((0.0, 1.0), (-1.0, 0.0)),
+    ((-1.0, 0.0), (0.0, -1.0)), ((-1.0, 0.0), (0.0, 1.0)), ((1.0, 0.0), (0.0, -1.0)),
+    ((0.0, 1.0), (1.0, 0.0)), ((0.0, -1.0), (-1.0, 0.0)),
+))  # fmt: skip
+"""For each turn of :data:`ros_pad.estimation.doubt.TURNS`, the matrix from the true horizontal
+force to the measured one."""
 
 Vector = tuple[float, float, float]
-
-
-class Stance:
-    """Sums over a stance, or a second of one."""
-
-    def __init__(self) -> None:
-        self.force, self.heights, self.duration = (0.0, 0.0, 0.0), 0.0, 0.0
-        self.likely = [0.0] * len(TURNS)  # log likelihoods of the motions
-        self.last: tuple[float, ...] | None = None  # block
-
-    def add(self, duration: float, height: float, force: Vector) -> None:
-        """Add a height, m, and a force, N, that have lasted for a time, s."""
-        (a, b, c), (x, y, z) = self.force, force
-        self.force = a + x * duration, b + y * duration, c + z * duration
-        self.heights += height * duration
-        self.duration += duration
-
-
-class Heights:
-    """Whether a foot swings below the heights at which it stands."""
-
-    def __init__(self) -> None:
-        self.below = 0  # swings in a row
-        self.restart()
-
-    def restart(self) -> None:
-        """Forget the height of the last stance."""
-        self._last = math.nan  # mean of the last stance, m
-        self.lowest, self.highest = math.inf, -math.inf  # since then, m
-
-    def stand(self, height: float) -> None:
-        """Process the mean height of a stance, m."""
-        last = height if math.isnan(self._last) else self._last
-        lowest, highest = min(height, last), max(height, last)
-        if self.lowest < lowest - BELOW and self.highest < lowest + BELOW:
-            self.below = min(STANCES, self.below + 1)
-        elif self.highest > highest + BELOW:
-            self.below = 0
-        self._last, self.lowest, self.highest = height, math.inf, -math.inf
 
 
 class Axes:
@@ -126,16 +86,25 @@ class Axes:
     def __init__(self, expected_load: float, softness: float, memory: float = BLOCK) -> None:
         self._expected_load, self._softness = expected_load, softness
         self._weight = 0.5 * BLOCK / memory  # blocks that follow each other agree
-        self._steep, self._heights = 0, Heights()
-        self._sure, self._raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
+        self._steep = self._below = (
+            0  # stances with a wrong normal axis, and swings below, in a row
+        )
+        self._sure, self._raw = np.zeros(len(TURNS)), np.zeros(len(TURNS))
         self.doubt = Doubt()
         self.restart()
 
     def restart(self) -> None:
         """Forget the present stance and the height of the last one."""
-        self._heights.restart()
+        self._stood = math.nan  # mean height of the last stance, m
+        self._swing = math.inf, -math.inf  # lowest and highest position since then, m
         self._loaded = False
-        self._stance = Stance()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin a stance, or a second of one."""
+        self._duration, self._sums = 0.0, np.zeros(4)  # of height and force over time
+        self._likely = np.zeros(len(TURNS))  # log likelihoods of the motions
+        self._last: tuple[float, np.ndarray, np.ndarray] | None = None  # block
 
     def update(self, duration: float, height: float, force: Vector) -> bool:
         """Process a position's height, m, and a force without offset, N, about every `BLOCK`.
@@ -143,116 +112,91 @@ class Axes:
         ``duration``, s, is the time since the last one. Return whether the foot has been loaded
         since then.
         """
-        x, y, z = force
-        size = math.sqrt(x * x + y * y + z * z)
+        size = math.hypot(*force)
         if not self._loaded:
-            self._heights.lowest = min(self._heights.lowest, height)
-            self._heights.highest = max(self._heights.highest, height)
+            self._swing = min(self._swing[0], height), max(self._swing[1], height)
             if size > LOADED * self._expected_load:
                 self._loaded = True
-                self._stance = Stance()
-            return False
-        if size < UNLOADED * self._expected_load or self._stance.duration > LONGEST:
-            self._end_stance()
-            return False
-        self._stance.add(duration, height, force)
-        return True
+                self._begin()
+        elif size < UNLOADED * self._expected_load or self._duration > LONGEST:
+            self._loaded = False
+            if self._duration >= SHORTEST:
+                self._end_stance()
+        else:
+            self._duration += duration
+            self._sums += duration * np.array((height, *force))
+            return True
+        return False
 
     def compare(
-        self, time: float, duration: float, x: float, y: float, fx: float, fy: float, sd: float
+        self, time: float, duration: float, place: np.ndarray, force: np.ndarray, sd: float
     ) -> None:
         """Compare means of position, m, and force, N, over a block with those of the last one.
 
         ``sd`` is the standard deviation of a change of the position between blocks, m; it is
         infinite if the direction of the force or the motion is not known.
         """
-        stance = self._stance
-        last, stance.last = stance.last, (time, x, y, fx, fy)
+        last, self._last = self._last, (time, place, force)
         if not last or time - last[0] > 1.5 * duration:
             return
-        _, a, b, c, d = last
         sd = math.hypot(sd, MODEL_SPEED * duration)
-        move, change = (x - a, y - b), (self._softness * (fx - c), self._softness * (fy - d))
+        move, change = place - last[1], self._softness * (force - last[2])
         if max(math.hypot(*move), math.hypot(*change)) < 2.0 * sd:
             return
-        force = 0.5 * (fx + c), 0.5 * (fy + d)
-        pulled = math.hypot(*force) > PULL * self._expected_load
-        found = likelihoods(move, change, force, sd, duration, pulled)
-        stance.likely = [*map(add, stance.likely, found)]
+        force = 0.5 * (force + last[2])
+        self._likely += self._likelihoods(move, change, force, sd, duration)
+
+    def _likelihoods(
+        self, move: np.ndarray, change: np.ndarray, force: np.ndarray, sd: float, duration: float
+    ) -> np.ndarray:
+        """Return the log likelihood of a motion in a time, s, for each of :data:`TURNS`.
+
+        ``move`` and ``change`` are those of the position, and of the measured force times
+        softness, m; ``force`` is the tangential one, N, and ``sd`` the standard deviation of the
+        motion of a foot that sticks, m.
+        """
+        variance, length = sd * sd, SLIP_SPEED * duration
+        wide = (3.0 * length) ** 2
+        away = move + change @ TURNS  # of the contact, in true axes
+        half = 0.5 * (away * away).sum(axis=1)
+        total = (STRAY * np.exp(-half / wide) + 1e-9) / wide
+        total += 0.5 / variance * np.exp(-half / variance)
+        pull = math.hypot(*force)
+        if pull > PULL * self._expected_load:  # else it has no direction
+            x, y = (force @ TURNS / pull).T
+            along = np.maximum(-away[:, 0] * x - away[:, 1] * y, 0.0)
+            across = away[:, 0] * y - away[:, 1] * x
+            spread = variance + (CROSSWISE * along) ** 2
+            slips = along * np.exp(-along / length - 0.5 * across * across / spread)
+            total += 0.5 * math.sqrt(2.0 * math.pi) / length**2 * slips / np.sqrt(spread)
+        return np.asarray(np.log(total))
 
     def _end_stance(self) -> None:
-        """Add the evidence of a stance, or of a second of one."""
-        self._loaded, stance = False, self._stance
-        if stance.duration < SHORTEST:
-            return
-        mean = [each / stance.duration for each in stance.force]
+        """Add the evidence of a stance, or of a second of one, and judge it."""
+        height, *mean = (self._sums / self._duration).tolist()
         steep = mean[2] < STEEPEST * math.hypot(*mean)
         self._steep = min(STANCES, self._steep + 1) if steep else 0
-        self._heights.stand(stance.heights / stance.duration)
-        for turn, likely in enumerate(stance.likely):
-            more = self._weight * (likely - stance.likely[0])
-            self._raw[turn] = max(-3.0 * SURE, self._raw[turn] + more)
-            sure = self._sure[turn] + min(MOST, max(LEAST, more))
-            self._sure[turn] = min(3.0 * SURE, max(-SURE, sure))
-        self._judge(mean)
-
-    def _judge(self, mean: Sequence[float]) -> None:
-        """Set the doubt after a stance with its mean force, N."""
+        self._compare_heights(height)
+        more = self._weight * (self._likely - self._likely[0])
+        self._raw = np.maximum(self._raw + more, -3.0 * SURE)
+        self._sure = np.clip(self._sure + np.clip(more, LEAST, MOST), -SURE, 3.0 * SURE)
         if self._steep >= STANCES:
             axis = max(range(3), key=lambda each: abs(mean[each]))
             code = doubt.UPSIDE_DOWN if axis == 2 else doubt.NORMAL
             self.doubt = Doubt(code, axis, mean[axis])
-        elif self._heights.below >= STANCES:
+        elif self._below >= STANCES:
             self.doubt = Doubt(doubt.BELOW)
         else:
-            turn = self._raw.index(max(self._raw))
-            sure = max(self._sure) >= (0.5 * SURE if self.doubt.code else SURE)
+            turn = int(self._raw.argmax())
+            sure = self._sure.max() >= (0.5 * SURE if self.doubt.code else SURE)
             self.doubt = Doubt(doubt.TURNED, turn) if turn and sure else Doubt()
 
-
-def likelihoods(
-    move: tuple[float, float],
-    change: tuple[float, float],
-    force: tuple[float, float],
-    sd: float,
-    duration: float,
-    pulled: bool,
-) -> list[float]:
-    """Return the log likelihood of a motion for each of :data:`TURNS`.
-
-    Parameters
-    ----------
-    move, change : tuple of float
-        Change of the position, and of the measured force times softness, m.
-    force : tuple of float
-        Measured tangential force, N.
-    sd : float
-        Standard deviation of the change of the position of a foot that sticks, m.
-    duration : float
-        Time in which it changed, s.
-    pulled : bool
-        Whether the force has a direction.
-    """
-    (move_x, move_y), (bend_x, bend_y), (fx, fy) = move, change, force
-    size = math.sqrt(fx * fx + fy * fy) or 1.0
-    fx, fy = fx / size, fy / size
-    variance, length = sd * sd, SLIP_SPEED * duration
-    wide = (3.0 * length) ** 2
-    sticks, slips = 0.5 / variance, 0.5 * math.sqrt(2.0 * math.pi) / length**2
-    found = []
-    for a, b, c, d in TURNS:
-        x, y = move_x + a * bend_x + c * bend_y, move_y + b * bend_x + d * bend_y
-        half = 0.5 * (x * x + y * y)
-        total = (STRAY * math.exp(-half / wide) + 1e-9) / wide
-        if half < 40.0 * variance:
-            total += sticks * math.exp(-half / variance)
-        if pulled:
-            pull_x, pull_y = a * fx + c * fy, b * fx + d * fy
-            along = -x * pull_x - y * pull_y
-            if along > 0.0:
-                across = x * pull_y - y * pull_x
-                spread = variance + (CROSSWISE * along) ** 2
-                less = along / length + 0.5 * across * across / spread
-                total += slips * along * math.exp(-less) / math.sqrt(spread)
-        found.append(math.log(total))
-    return found
+    def _compare_heights(self, height: float) -> None:
+        """Compare the heights of a swing, m, with those of the stances before and after it."""
+        last = height if math.isnan(self._stood) else self._stood
+        lowest, highest = min(height, last), max(height, last)
+        if self._swing[0] < lowest - BELOW and self._swing[1] < lowest + BELOW:
+            self._below = min(STANCES, self._below + 1)
+        elif self._swing[1] > highest + BELOW:
+            self._below = 0
+        self._stood, self._swing = height, (math.inf, -math.inf)

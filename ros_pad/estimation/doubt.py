@@ -6,31 +6,7 @@ The kind of a doubt is the part of its text before the colon.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    from ros_pad.estimation.ground import Stance
-
-CONCLUSIVE = 1.0
-"""Change of the log odds of wet ground, up or down, above which a stance is conclusive."""
-
-SURE = 0.9
-"""Probability of wet or of dry ground above which a stance with enough pull leaves no doubt, even
-if it is not conclusive."""
-
-DOMED = 0.1
-"""Share of the load on domes above which wet and dry ground cannot be distinguished."""
-
-ALL_DOMED = 0.9
-"""Share of the load on domes above which a foot is a dome, and not half inflated."""
-
-PULLED = 1.5
-"""Ratio of T/N to the expected friction of wet ground up to which a foot was not pulled enough:
-the true friction of wet ground may be 1.5 times the expected one."""
-
-LIGHT = 0.3
-"""Share of the expected load below which sensor noise hides the friction."""
-
+from typing import NamedTuple
 
 TURNS = (
     'the ordinary ones',
@@ -106,10 +82,10 @@ TABLE = (
     NO_WRENCH, NO_POSITION, REFUSED, NO_VELOCITY,
 ) = range(len(TABLE))  # fmt: skip
 
-KINDS = tuple(dict.fromkeys(each.kind for each in TABLE))
+DOUBTS = tuple(dict.fromkeys(each.kind for each in TABLE))
 """Kinds of doubt; the first one, empty, is no doubt."""
 
-FAULTS = tuple(dict.fromkeys(each.kind for each in TABLE if each.fault))
+SENSOR_FAULTS = tuple(dict.fromkeys(each.kind for each in TABLE if each.fault))
 """Kinds of doubt about sensors, not about the ground."""
 
 
@@ -145,43 +121,3 @@ def text(code: float, a: float = 0.0, b: float = 0.0) -> str:
         a=a, b=b, axis='xyz'[place % 3], sign='-' if b < 0.0 else '', turn=TURNS[place]
     )
     return f'{row.kind}: {details}'
-
-
-def of_ground(
-    stance: Stance,
-    log_odds: float,
-    belief: tuple[float, float, float],
-    load: float,
-    expected_load: float,
-    wet_friction: float,
-) -> Doubt:
-    """Return why the ground is unobservable in a stance; no doubt if it is observable.
-
-    Parameters
-    ----------
-    stance : Stance
-        Its evidence so far.
-    log_odds : float
-        Change of the log odds of wet ground by it.
-    belief : tuple of float
-        Present probability of wet ground, 0 to 1, and mean and standard deviation of friction.
-    load, expected_load : float
-        Largest normal force, and the expected one, N.
-    wet_friction : float
-        Friction that feet expect of wet ground.
-    """
-    if stance.dome_share > ALL_DOMED:
-        return Doubt(ALL_DOME)
-    if stance.dome_share > DOMED:
-        return Doubt(HALF, 100.0 * stance.dome_share)
-    if abs(log_odds) >= CONCLUSIVE:
-        return Doubt()
-    if load < LIGHT * expected_load:
-        return Doubt(FAINT, load, expected_load)
-    if stance.peak_turning > stance.peak_ratio:
-        return Doubt(TURNING, stance.peak_turning, stance.peak_ratio)
-    if stance.peak_ratio < PULLED * wet_friction:
-        return Doubt(NOT_PULLED, stance.peak_ratio, wet_friction)
-    if not 1.0 - SURE < belief[0] < SURE:
-        return Doubt()
-    return Doubt(UNDECIDED, *belief[1:])

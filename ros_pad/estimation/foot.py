@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimators of one foot and of all: slip, wetness, friction, and friction margin."""
+"""Estimator of one foot: slip, wetness, friction, and friction margin."""
 
 from __future__ import annotations
 
@@ -7,128 +7,18 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ros_pad.configuration import instance, integer, number, shown
+from ros_pad.configuration import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.friction import GroundFilter, GroundModel
-from ros_pad.estimation.ground import LONGEST_GAP, Ground, shared_friction
-from ros_pad.estimation.noise import SensorNoise
-from ros_pad.estimation.track import Sample, Track
+from ros_pad.estimation.ground import Ground
+from ros_pad.estimation.track import Sample, Track, check
 from ros_pad.estimation.tuning import Tuning
+from ros_pad.estimation.watch import Watch
 
-
-class FeetEstimator:
-    """Estimate slip, wetness and friction of all feet of a robot, which learn together.
-
-    See :class:`ros_pad.estimation.FootEstimator` for what it does; samples are not checked.
-
-    Parameters
-    ----------
-    count : int
-        Number of feet, from 1.
-    foot : Foot
-        All feet are of this kind.
-    expected_load : float
-        Normal force on a foot in stance, N, above 0.
-    tuning : Tuning or None
-        Settings for sensors and ground.
-
-    Attributes
-    ----------
-    tuning : Tuning
-        As given.
-    shared : FrictionScales
-        What the feet learn of friction together.
-    tracks : list of Track
-        What each foot does, and knows of the ground.
-
-    Raises
-    ------
-    InvalidInput
-        When the expected load is not a number above 0, the count no whole number from 1, or foot
-        or tuning of another class.
-    """
-
-    def __init__(
-        self, count: int, foot: Foot, expected_load: float, tuning: Tuning | None = None
-    ) -> None:
-        instance('foot', foot, Foot)
-        self.tuning = tuning = Tuning() if tuning is None else tuning
-        instance('tuning', tuning, Tuning)
-        integer('count', count, 1)
-        load = number('expected_load', expected_load, 'N', above=True)
-        self.shared = shared_friction(foot, load, tuning)
-        model = GroundModel(
-            self.shared, tuning.wet_prior, tuning.patch_length, rim_speed=tuning.rim_speed(foot)
-        )
-        self.tracks = [Track(Ground(foot, load, tuning, model)) for _ in range(count)]
-
-    def update(
-        self, time: float, samples: Sequence[Sample | None], pressures: Sequence[float]
-    ) -> None:
-        """Process the samples of a time; the clock may have been set back.
-
-        Parameters
-        ----------
-        time : float
-            Time, s.
-        samples : sequence of Sample or None
-            A sample of each foot, None where it has none.
-        pressures : sequence of float
-            Gauge pressure in the pads of each foot, Pa.
-        """
-        for track, sample, pressure in zip(self.tracks, samples, pressures, strict=True):
-            track.fresh = False
-            if sample:
-                track.update(time, sample, pressure)
-
-
-LARGEST_FORCE, LARGEST_POSITION, LARGEST_PRESSURE = 1e5, 1e6, 1e7
-"""Largest size of a force, N, and moment, N m, of a position, m, and of a gauge pressure, Pa."""
-
-NUMBERS = (
-    *((f'force {axis}', -LARGEST_FORCE, LARGEST_FORCE, 'N') for axis in 'xyz'),
-    ('moment', -LARGEST_FORCE, LARGEST_FORCE, 'N m'),
-    *((f'position {axis}', -LARGEST_POSITION, LARGEST_POSITION, 'm') for axis in 'xyz'),
-    *((f'velocity {axis}', -1e6, 1e6, 'm/s') for axis in 'xy'),
-    *((f'variance {axis}', 0.0, math.inf, 'm²/s²') for axis in 'xy'),
-    ('age of the position', 0.0, 1e12, 's'),
-    ('pressure', -LARGEST_PRESSURE, LARGEST_PRESSURE, 'Pa'),
-    ('deviation', 0.0, 1e6, 'm/s'),
-)
-"""Names, limits and units of the numbers of a sample, and of what comes with it. A larger value,
-though finite, would spoil sums and means for ever."""
-
-
-def wrong_numbers(time: float, numbers: Sequence[float]) -> list[str]:
-    """Return what is outside its limits of a time, s, and :data:`NUMBERS`, or the first of them.
-
-    The moment may be NaN.
-    """
-    wrong = [
-        f'{name} = {shown(value)} {unit}'
-        for (name, low, high, unit), value in zip(NUMBERS, numbers, strict=False)
-        if not (low <= value <= high or (name == 'moment' and value != value))
-    ]
-    return wrong if abs(time) < math.inf else [*wrong, f'time = {shown(time)} s']
-
-
-def refuse(time: float, last: float, wrong: Sequence[str]) -> None:
-    """Refuse a sample of a time, s, with wrong numbers, or hardly before the last one, s.
-
-    No clock is set back by so little.
-    """
-    if wrong:
-        raise InvalidInput(
-            f'sample at {shown(time)} s: {", ".join(wrong)}: must be finite, and not larger than'
-            ' a sensor can show'
-        )
-    if last - LONGEST_GAP < time <= last:
-        raise InvalidInput(
-            f'time = {shown(time)} s is not allowed: it must be later than that of the last'
-            f' sample, {shown(last)} s'
-        )
+LARGEST_PRESSURE = 1e7
+"""Largest size of a gauge pressure, Pa."""
 
 
 class ContactMotion(NamedTuple):
@@ -231,15 +121,15 @@ class FootEstimator:
         Foot, which gives expected friction and shear stiffness.
     expected_load : float
         Normal force in stance, N, above 0.
-    tuning : Tuning
-        Settings for sensors and ground.
+    tuning : Tuning or None
+        Settings for sensors and ground; None takes the defaults.
+    model : GroundModel or None
+        Model of the ground, that of another foot if both learn together; None makes one.
 
     Attributes
     ----------
     estimate : Estimate
         Estimate after the last sample.
-    feet : FeetEstimator
-        The estimator of all feet of a robot, mostly of this one alone.
 
     Raises
     ------
@@ -268,30 +158,17 @@ class FootEstimator:
     (True, 0.2)
     """
 
-    def __init__(self, foot: Foot, expected_load: float, tuning: Tuning | None = None) -> None:
-        self.feet, self._place = FeetEstimator(1, foot, expected_load, tuning), 0
+    def __init__(
+        self,
+        foot: Foot,
+        expected_load: float,
+        tuning: Tuning | None = None,
+        model: GroundModel | None = None,
+    ) -> None:
+        tuning = Tuning() if tuning is None else tuning
+        model = model or GroundModel.of(foot, expected_load, tuning)
+        self._track = Track(Ground(foot, expected_load, tuning, model))
         self.estimate = self._estimate()
-
-    @classmethod
-    def of(cls, feet: FeetEstimator) -> list[FootEstimator]:
-        """Return an estimator for each foot of a robot, which learn together.
-
-        Parameters
-        ----------
-        feet : FeetEstimator
-            The estimator of all feet.
-
-        Returns
-        -------
-        list of FootEstimator
-            They share its state.
-        """
-        found = []
-        for place in range(len(feet.tracks)):
-            found.append(cls.__new__(cls))
-            found[-1].feet, found[-1]._place = feet, place
-            found[-1].estimate = found[-1]._estimate()
-        return found
 
     def update(
         self,
@@ -336,30 +213,30 @@ class FootEstimator:
             When a value is not a finite number, force or position are not three numbers, time
             does not advance, or the motion is missing or has a deviation below 0.
         """
-        tuning, track = self.feet.tuning, self.feet.tracks[self._place]
-        velocity, sd, why = (0.0, 0.0), 0.0, ''
-        if tuning.source == 'joints':
-            if motion is None:
-                raise InvalidInput(
-                    f'sample at {time!r} s: motion = None is not allowed: with source joints the'
-                    ' velocity of the contact is needed'
-                )
-            velocity, sd, why = motion
+        tuning, track = self._track.ground.tuning, self._track
+        if tuning.source != 'joints':
+            motion = ContactMotion((0.0, 0.0), 0.0)
+        elif motion is None:
+            raise InvalidInput(
+                f'sample at {time!r} s: motion = None is not allowed: with source joints the'
+                ' velocity of the contact is needed'
+            )
+        sd = number('deviation of the velocity', motion.sd, 'm/s', high=1e6)
+        number('pressure', pressure, 'Pa', -LARGEST_PRESSURE, LARGEST_PRESSURE)
         yaw = math.nan if moment is None or not tuning.moment_noise else moment
         try:
             (fx, fy, fz), (x, y, z) = force, position
             age = 0.0 if position_time is None else abs(time - position_time)
-            variance = math.inf if why else sd**2
-            sample = fx, fy, fz, yaw, x, y, z, *velocity, variance, variance, age
-            wrong = wrong_numbers(time, (*sample, pressure, sd))
+            variance = math.inf if motion.doubt else sd**2
+            sample = Sample(fx, fy, fz, yaw, x, y, z, *motion.velocity, variance, age)
+            sample = Sample(*map(float, sample))
         except (TypeError, ValueError) as error:
             raise InvalidInput(
-                f'sample at {time!r} s: force = {force!r}, position = {position!r}, pressure ='
-                f' {pressure!r}, moment = {moment!r}: three numbers each are needed for force and'
-                ' position, one number each for time, pressure and moment'
+                f'sample at {time!r} s: force = {force!r}, position = {position!r}, moment ='
+                f' {moment!r}: three numbers each are needed for force and position, one number'
+                ' each for time and moment'
             ) from error
-        refuse(time, track.time, wrong)
-        track.fresh = False
+        check(sample, time, track.time)
         track.update(time, sample, pressure)
         self.estimate = self._estimate()
         return self.estimate
@@ -367,15 +244,15 @@ class FootEstimator:
     @property
     def ground(self) -> GroundFilter:
         """Posterior of wet ground and friction."""
-        return self.feet.tracks[self._place].ground.filter
+        return self._track.ground.filter
 
     @property
-    def noise(self) -> SensorNoise:
-        """Configured and measured noise of the sensors."""
-        return self.feet.tracks[self._place].watch.noise
+    def noise(self) -> Watch:
+        """Configured and measured noise of the sensors: its ``position`` and ``force``."""
+        return self._track.watch
 
     def _estimate(self) -> Estimate:
-        track = self.feet.tracks[self._place]
+        track = self._track
         now, ground = track.standing, track.ground
         return Estimate(
             track.time, track.stands, now.slipping, now.slip_velocity, now.slip_speed,

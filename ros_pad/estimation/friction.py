@@ -13,13 +13,15 @@ does not fade. What is expected of new ground is learnt by all feet together, se
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy import special
 
-from ros_pad.estimation.scales import EDGES, GRID, Felt, FrictionScales
+from ros_pad.configuration import instance, number
+from ros_pad.contact.resistance import Foot
+from ros_pad.estimation.scales import EDGES, GRID, Felt, FrictionPrior, FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
@@ -51,8 +53,10 @@ CREEP, CREEP_SPEED, LEAST_PULL = 0.01, 0.025, 0.04
 over T/N, m/s, and what is added to T/N; the density is assumed exponential. Without creep, ground
 that holds more than any gait demands would be taken for ground that slips at that demand."""
 
-MODEL_ERROR = 0.01
-MODEL_SQUARE = 0.08
+TEMPER = 0.5
+"""Weight of a sample: successive samples are not independent."""
+
+MODEL_ERROR, MODEL_SQUARE = 0.01, 0.08
 """Error of friction measured in slip, mean over a walk: the first, and the second times the square
 of friction. A window may contain some stick, and feet turn more or less than assumed; the more
 they hold, the slower they slip, and the more turning hides."""
@@ -121,17 +125,11 @@ class GroundModel:
         Prior probability of wet ground, in (0, 1).
     patch_length : float
         Distance over which wet and dry ground are assumed to change, m, above 0.
-    temper : float
-        Weight of a sample, in (0, 1]: successive samples are not independent.
     rim_speed : float
         Root mean square of the speed with which feet scrub as they turn about the vertical, m/s,
         0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while
         its rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe
         and Cutkosky 1996); s is not measured.
-    model_error : float
-        Standard deviation of T/N as a measure of friction, > 0, in addition to
-        :data:`MODEL_SQUARE` times its square. It is the same in every sample: averaging does not
-        reduce it.
     """
 
     def __init__(
@@ -139,21 +137,39 @@ class GroundModel:
         shared: FrictionScales,
         wet_prior: float = Tuning.wet_prior,
         patch_length: float = Tuning.patch_length,
-        temper: float = 0.5,
         rim_speed: float = 0.0,
-        model_error: float = MODEL_ERROR,
     ) -> None:
         self.shared = shared
         self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
-        self.patch_length, self.temper, self.rim_speed = patch_length, temper, rim_speed
+        self.patch_length, self.rim_speed = patch_length, rim_speed
         self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
-        error = np.hypot(model_error, MODEL_SQUARE * GRID * GRID)
+        error = np.hypot(MODEL_ERROR, MODEL_SQUARE * GRID * GRID)
         blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
         blur = (blur / blur.sum(axis=0)).T
         # From a posterior to sums of the blurred one up to each edge, and to its moments.
         self.summary = np.column_stack((
             np.zeros_like(GRID), blur.cumsum(axis=1), blur.dot(GRID), blur.dot(GRID * GRID),
         ))  # fmt: skip
+
+    @classmethod
+    def of(cls, foot: Foot, expected_load: float, tuning: Tuning) -> GroundModel:
+        """Return the model of feet with this load, N, and tuning, for all feet of a robot.
+
+        Raises
+        ------
+        InvalidInput
+            When the load is not a number above 0, or foot or tuning of another class.
+        """
+        instance('foot', foot, Foot)
+        instance('tuning', tuning, Tuning)
+        number('expected_load', expected_load, 'N', above=True)
+        prior = FrictionPrior.of(foot, expected_load)
+        return cls(
+            FrictionScales(prior, tuning.scales, tuning.learn_friction),
+            tuning.wet_prior,
+            tuning.patch_length,
+            foot.turning_radius * tuning.turning_rate,
+        )
 
     def likelihood(self, sample: Evidence, rest: float, slip: float) -> np.ndarray:
         """Return the likelihood of a sample, shape (2, grid), from its first two factors."""
@@ -206,6 +222,8 @@ class GroundFilter:
         Expected friction, which the foot learns together with others.
     expected : Expected
         Friction of new ground by what the feet have learnt up to this stance.
+    posterior : array (2, grid)
+        Joint probabilities of ground (dry, wet) and friction.
     wet_probability : float
         Probability of wet ground, 0 to 1.
     scales : tuple of float
@@ -248,13 +266,13 @@ class GroundFilter:
             # The friction of one morphology gives no evidence of the friction of the other: keep
             # only the probability of wet ground.
             self._dome = dome
-            self._posterior = self._wet_or_dry() * self._priors
+            self.posterior = self._wet_or_dry() * self._priors
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self.fade(distance)
         if dome:
-            self._posterior[1] = self.expected.undrained * self.wet_probability
-            self._normalise(self._posterior)
+            self.posterior[1] = self.expected.undrained * self.wet_probability
+            self._normalise(self.posterior)
         self._begin()
 
     @property
@@ -264,7 +282,7 @@ class GroundFilter:
     def fade(self, distance: float) -> None:
         """Fade towards the prior over a distance, m, without measurements."""
         self._move(distance)
-        self._normalise(self._posterior)
+        self._normalise(self.posterior)
 
     def forget(self, time: float) -> None:
         """Return to the prior, and take back what the foot has shown to others, at a time, s."""
@@ -278,11 +296,6 @@ class GroundFilter:
         self._normalise(self.model.grounds * self._priors)
         self._begin()
 
-    @property
-    def posterior(self) -> np.ndarray:
-        """Joint probabilities of ground (dry, wet) and friction, shape (2, grid)."""
-        return self._posterior
-
     def update(self, sample: Evidence) -> None:
         """Process one sample of T/N and of slip speed."""
         self.scales = sample.scales
@@ -290,13 +303,13 @@ class GroundFilter:
         evidence = self.model.likelihood(sample, rest, slip)
         evidence += 1e-6
         np.log(evidence, out=evidence)
-        evidence *= sample.weight * self.model.temper
+        evidence *= sample.weight * TEMPER
         self._multiply(evidence, shown)
         if sample.speed > 0.0:
             self._move(sample.speed * sample.dt)
         if self._dome:
             self._drain(sample.dt)
-        self._normalise(self._posterior)
+        self._normalise(self.posterior)
 
     def _multiply(self, evidence: np.ndarray, shown: float) -> None:
         """Multiply by a likelihood, given as logarithm; a share of it shows friction.
@@ -304,12 +317,12 @@ class GroundFilter:
         The rest shows only whether the ground is wet, or nothing under a dome.
         """
         after = np.exp(evidence)
-        after *= self._posterior
-        grounds = (self._posterior if self._dome else after).dot(_ONES)
+        after *= self.posterior
+        grounds = (self.posterior if self._dome else after).dot(_ONES)
         if self._dome or shown < 1.0:
             evidence *= shown
             np.exp(evidence, out=after)
-            after *= self._posterior
+            after *= self.posterior
             rest = (grounds / after.dot(_ONES))[:, None]
             after *= rest
             if not self._dome:
@@ -318,11 +331,11 @@ class GroundFilter:
         (dry, wet), before = grounds.tolist(), self.wet_probability
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
         after *= 1.0 / (dry + wet)
-        self._posterior = after
+        self.posterior = after
 
     def _drain(self, dt: float) -> None:
         """Let friction rise on the same ground, as the film under a dome drains for a time, s."""
-        keep, posterior = math.exp(-dt / DRAINING_TIME), self._posterior
+        keep, posterior = math.exp(-dt / DRAINING_TIME), self.posterior
         wet = posterior[1].dot(_ONES)
         posterior[1] *= keep
         posterior[1] += (1.0 - keep) * wet * self.expected.dome[1]
@@ -337,31 +350,25 @@ class GroundFilter:
             # Under domes the ground is unobservable: when friction fades, the probability of wet
             # ground must not change.
             before = self._wet_or_dry()
-            friction = self._posterior / before
+            friction = self.posterior / before
             friction = stay * friction + (1.0 - stay) * self.expected.dome
-            self._posterior = (stay * before + (1.0 - stay) * grounds) * friction
+            self.posterior = (stay * before + (1.0 - stay) * grounds) * friction
         else:
             new = ((1.0 - stay) * grounds) * self.expected.flat
-            new += stay * self._posterior
-            self._posterior = new
+            new += stay * self.posterior
+            self.posterior = new
 
     def _wet_or_dry(self) -> np.ndarray:
-        return self._posterior.dot(_ONES)[:, None]
+        return self.posterior.dot(_ONES)[:, None]
 
     def _normalise(self, posterior: np.ndarray) -> None:
         # Without normalisation rounding errors would grow: after a hundred touch-downs the sum
         # would be zero.
         dry, wet = posterior.dot(_ONES).tolist()
-        self._posterior = posterior / (dry + wet)
-        self._summed: np.ndarray | None = None
+        self.posterior = posterior / (dry + wet)
         self.wet_probability = wet / (dry + wet)
-
-    @property
-    def _summary(self) -> np.ndarray:
-        """Sums of the probabilities of friction on dry and on wet ground, and two moments."""
-        if self._summed is None:
-            self._summed = self._posterior.dot(self.model.summary)
-        return self._summed
+        # Sums of the probabilities of friction on dry and on wet ground, and two moments.
+        self._summary = self.posterior.dot(self.model.summary)
 
     @property
     def friction(self) -> tuple[float, float]:
@@ -372,19 +379,14 @@ class GroundFilter:
         square = dry * dry * dry_square + wet * wet * wet_square
         return mean, math.sqrt(max(square - mean * mean, 0.0))
 
-    def quantile(self, share: float) -> float:
-        """Return the friction coefficient that is exceeded with probability 1 - share.
+    def quantile(self, shares: npt.ArrayLike) -> np.ndarray:
+        """Return the friction coefficients that are exceeded with probability 1 - share.
 
-        The share is from 0 to 1; the coefficient is that at the load of the last sample.
+        The shares are from 0 to 1; the coefficients are those at the load of the last sample.
         """
-        return float(self.quantiles([share])[0])
-
-    def quantiles(self, shares: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Return the same for several shares."""
         dry, wet = self.scales
         edges = dry * EDGES
         on_dry, on_wet = self._summary[:, :-2]
         if dry != wet:
             on_wet = np.interp(edges, wet * EDGES, on_wet)
-        found: np.ndarray = np.interp(np.asarray(shares), on_dry + on_wet, edges)
-        return found
+        return np.asarray(np.interp(np.asarray(shares), on_dry + on_wet, edges))

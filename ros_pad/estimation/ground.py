@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ros_pad.contact.resistance import THICK_FILM, Foot
-from ros_pad.estimation import doubt
+from ros_pad.estimation import alarm, doubt
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
-from ros_pad.estimation.scales import FrictionPrior, FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
 if TYPE_CHECKING:
@@ -20,6 +19,28 @@ if TYPE_CHECKING:
 MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
 
+RATIO_NOISE = 0.03
+"""Model error of T/N, added to that of the sensors."""
+
+CONCLUSIVE = 1.0
+"""Change of the log odds of wet ground, up or down, above which a stance is conclusive."""
+
+SURE = 0.9
+"""Probability of wet or of dry ground above which a stance with enough pull leaves no doubt, even
+if it is not conclusive."""
+
+DOMED = 0.1
+"""Share of the load on domes above which wet and dry ground cannot be distinguished."""
+
+ALL_DOMED = 0.9
+"""Share of the load on domes above which a foot is a dome, and not half inflated."""
+
+PULLED = 1.5
+"""Ratio of T/N to the expected friction of wet ground up to which a foot was not pulled enough:
+the true friction of wet ground may be 1.5 times the expected one."""
+
+LIGHT = 0.3
+"""Share of the expected load below which sensor noise hides the friction."""
 
 LONGEST_GAP = 0.15
 """Longest gap between samples of one stance, s: in a longer gap the foot may have stepped."""
@@ -100,7 +121,7 @@ class Ground:
         self._stance = Stance()
         self._footprint: tuple[float, float] | None = None  # of the last stance, m
         self.belief = (tuning.wet_prior, *self.filter.friction)
-        self.quantile = self.filter.quantile(MARGIN_SHARE)
+        self.quantile = float(self.filter.quantile(MARGIN_SHARE))
         self.doubt = Doubt(doubt.NOT_YET)
 
     def touch_down(self, time: float, x: float, y: float, pressure: float) -> None:
@@ -108,8 +129,8 @@ class Ground:
         self._stance = Stance(self._share_on_domes(pressure))
         distance = math.dist(self._footprint or (x, y), (x, y))
         self._footprint = x, y
-        self.filter.touch_down(distance, self._stance.dome_share > doubt.DOMED, time)
-        self.quantile = self.filter.quantile(MARGIN_SHARE)
+        self.filter.touch_down(distance, self._stance.dome_share > DOMED, time)
+        self.quantile = float(self.filter.quantile(MARGIN_SHARE))
 
     def lose(self) -> None:
         """Return to the prior, because the sensors are in doubt."""
@@ -148,15 +169,31 @@ class Ground:
         turning_known : bool
             Whether the torque about z was measured.
         """
-        ground, stance = self.filter, self._stance
+        ground = self.filter
         self._follow_pressure(time, pressure)
         ground.update(self._evidence(time - window.start, window, place, noises, turning_known))
-        self.quantile = ground.quantile(MARGIN_SHARE)
+        self.quantile = float(ground.quantile(MARGIN_SHARE))
         self.belief = ground.wet_probability, *ground.friction
-        self.doubt = doubt.of_ground(
-            stance, ground.log_odds, self.belief, window.peak, self.expected_load,
-            ground.expected.medians.flat_wet,
-        )  # fmt: skip
+        self.doubt = self._unobservable(window.peak)
+
+    def _unobservable(self, load: float) -> Doubt:
+        """Return why this stance with its largest load, N, does not show the ground, if so."""
+        stance, wet_friction = self._stance, self.filter.expected.flat_wet
+        if stance.dome_share > ALL_DOMED:
+            return Doubt(doubt.ALL_DOME)
+        if stance.dome_share > DOMED:
+            return Doubt(doubt.HALF, 100.0 * stance.dome_share)
+        if abs(self.filter.log_odds) >= CONCLUSIVE:
+            return Doubt()
+        if load < LIGHT * self.expected_load:
+            return Doubt(doubt.FAINT, load, self.expected_load)
+        if stance.peak_turning > stance.peak_ratio:
+            return Doubt(doubt.TURNING, stance.peak_turning, stance.peak_ratio)
+        if stance.peak_ratio < PULLED * wet_friction:
+            return Doubt(doubt.NOT_PULLED, stance.peak_ratio, wet_friction)
+        if not 1.0 - SURE < self.belief[0] < SURE:
+            return Doubt()
+        return Doubt(doubt.UNDECIDED, *self.belief[1:])
 
     def _share_on_domes(self, pressure: float) -> float:
         return self.foot.dome_load(self.expected_load, pressure) / self.expected_load
@@ -165,8 +202,8 @@ class Ground:
         """Begin a new stance at the same place when the foot changes its shape under load."""
         stance = self._stance
         before, stance.dome_share = stance.dome_share, self._share_on_domes(pressure)
-        dome = stance.dome_share > doubt.DOMED
-        if (before > doubt.DOMED) != dome:
+        dome = stance.dome_share > DOMED
+        if (before > DOMED) != dome:
             self.filter.touch_down(0.0, dome, time)
             stance.counted = None
 
@@ -188,7 +225,7 @@ class Ground:
             share = turning / ratio / self.foot.turning_radius
             force_noise = math.hypot(force_noise, share * tuning.moment_noise)
         sensors = math.hypot(force_noise / math.sqrt(count), offset_sd) / load
-        noise = math.hypot(tuning.ratio_noise, sensors * math.sqrt(1.0 + ratio**2))
+        noise = math.hypot(RATIO_NOISE, sensors * math.sqrt(1.0 + ratio**2))
         stance.peak_ratio = max(stance.peak_ratio, pull)
         stance.peak_turning = max(stance.peak_turning, turning)
         # The error of the body's velocity is the same in the whole window.
@@ -196,12 +233,11 @@ class Ground:
         if tuning.source != 'joints':
             # The mean speed is the displacement of the smoothed contact over the duration. The
             # smoother starts from one sample, so its noise is larger at the start of a stance.
-            spread = 2.0 * duration / (2.0 * tuning.smoothing * count + duration)
+            spread = 2.0 * duration / (2.0 * alarm.SMOOTHING * count + duration)
             if window.first:
                 spread = 0.5 * spread + 1.0
-            speed_noise = math.hypot(
-                tuning.speed_noise, contact_noise * math.sqrt(spread) / duration
-            )
+            marker = contact_noise * math.sqrt(spread) / duration
+            speed_noise = math.hypot(alarm.SPEED_NOISE, marker)
         weight = stance.weight(ratio, noise, *place)
         scales = self._scales(load, stance.dome_share)
         return Evidence(
@@ -213,7 +249,7 @@ class Ground:
 
         The adhesion of a flat sole that touches all over does not grow with the load.
         """
-        if dome_share > doubt.DOMED:
+        if dome_share > DOMED:
             return 1.0, 1.0
         kernel, prior = self.foot.resistance_of, self.filter.shared.prior
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
@@ -223,9 +259,3 @@ class Ground:
             dry / prior.flat_dry if prior.flat_dry else 1.0,
             wet / prior.flat_wet if prior.flat_wet else 1.0,
         )
-
-
-def shared_friction(foot: Foot, expected_load: float, tuning: Tuning) -> FrictionScales:
-    """Return what feet of one robot share of friction, before a walk."""
-    prior = FrictionPrior.of(foot, expected_load)
-    return FrictionScales(prior, tuning.scales, tuning.learn_friction)

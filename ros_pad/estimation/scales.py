@@ -153,11 +153,9 @@ class Expected:
         self.flat, self.dome, self.undrained = rows[:2], rows[2:4], rows[4]
 
     @cached_property
-    def medians(self) -> FrictionPrior:
-        """Median for each ground and morphology."""
-        return FrictionPrior(
-            *(float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in self.rows[:3])
-        )
+    def flat_wet(self) -> float:
+        """Median for flat feet on wet ground."""
+        return float(np.interp(0.5, np.cumsum(self.flat[1]), EDGES[1:]))
 
 
 class FrictionScales:
@@ -212,7 +210,7 @@ class FrictionScales:
         self._films /= self._films.sum(axis=0)
         self._felt: list[Felt] = []
         self._period = -math.inf
-        self._now = self._before = self._expected()
+        self._now = self._expected()
 
     def join(self) -> int:
         """Return the number of one more foot."""
@@ -228,7 +226,7 @@ class FrictionScales:
         self._felt = [felt for felt in self._felt if felt.foot != foot]
         self._fed[foot][:] = 0.0
         self._weigh()
-        self._now = self._before = self._expected()
+        self._now = self._expected()
 
     @property
     def scales(self) -> dict[str, Scale]:
@@ -244,15 +242,10 @@ class FrictionScales:
     def expected(self, time: float) -> Expected:
         """Return what feet expect of a stance that begins at a time, s."""
         period = math.floor(time / PERIOD)
-        if period <= self._period - 2:  # the clock has been set back: what is later is old
-            self._update(time, math.inf)
-            self._before = self._now
-        elif period > self._period:
-            if period > self._period + 1:  # a late foot may begin in the one before
-                self._update(-math.inf, (period - 1) * PERIOD - DELAY)
+        if period > self._period:
             self._update(-math.inf, period * PERIOD - DELAY)
-        else:
-            return self._now if period == self._period else self._before
+        elif period < self._period:  # the clock has been set back: what is later is old
+            self._update(time, math.inf)
         self._period = period
         return self._now
 
@@ -276,7 +269,7 @@ class FrictionScales:
                 self._learn(each)
             else:
                 self._felt.append(each)
-        self._before, self._now = self._now, self._expected()
+        self._now = self._expected()
 
     def _learn(self, felt: Felt) -> None:
         # What a dome feels does not show the ground: both keep their odds.

@@ -12,9 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from operator import eq
+from typing import TYPE_CHECKING
 
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
+
+if TYPE_CHECKING:
+    from ros_pad.estimation.track import Sample
 
 PATIENCE = 0.1
 """Time for which a value may stay the same to the last bit, s: markers are sampled more slowly
@@ -44,70 +48,6 @@ LEAP_DISTANCE = 0.02
 """Distance above which a jump at such a speed cannot come from clock jitter, m."""
 
 
-class Repeats:
-    """Measure for how long each of several values has not changed at all.
-
-    Parameters
-    ----------
-    noises : sequence of float
-        Standard deviation of each value; values without noise never count as stopped.
-
-    Attributes
-    ----------
-    noises : sequence of float
-        As given; none may change to or from 0.
-    since : list of float
-        Time since which each value has not changed, s.
-    last : sequence of float
-        Last values.
-    """
-
-    def __init__(self, noises: Sequence[float]) -> None:
-        self.noises = noises
-        self._steps = [math.inf] * len(noises)  # smallest change so far
-        # Whether each value has changed by twice its noise or less: then none of them stops while
-        # all of them change.
-        self._fine = False
-        self.last: Sequence[float] = (math.nan,) * len(noises)
-        self._changed: float | None = 0.0  # when all values changed last; None if not all did
-        self.since: list[float] = []
-        self._counts: list[int] = []
-
-    def update(self, time: float, values: Sequence[float]) -> Sequence[int]:
-        """Process the values of a time, s; return the indices of those that have stopped."""
-        last, self.last = self.last, values
-        if self._fine and not any(map(eq, values, last)):
-            self._changed = time
-            return ()
-        return self._compare(time, last, values)
-
-    def _compare(
-        self, time: float, last: Sequence[float], values: Sequence[float]
-    ) -> Sequence[int]:
-        """Process values of which some may be those of the time before."""
-        stopped: list[int] = []
-        if self._changed is not None:
-            self.since, self._counts = [self._changed] * len(values), [1] * len(values)
-            self._changed = None
-        since, counts = self.since, self._counts
-        for place, (value, noise) in enumerate(zip(values, self.noises, strict=True)):
-            if value != last[place]:
-                self._steps[place] = min(self._steps[place], abs(value - last[place]))
-                since[place] = time
-                counts[place] = 1
-                continue
-            counts[place] += 1
-            if noise and counts[place] >= FEWEST and time - since[place] > PATIENCE:
-                coarse = 2.0 * noise < self._steps[place] < math.inf
-                if not coarse or time - since[place] > DEAD:
-                    stopped.append(place)
-        self._fine = all(
-            step <= 2.0 * noise or not noise
-            for step, noise in zip(self._steps, self.noises, strict=True)
-        )
-        return stopped
-
-
 class SensorFaults:
     """Find faults of the force sensor and the marker of one foot.
 
@@ -131,7 +71,12 @@ class SensorFaults:
 
     def restart(self) -> None:
         """Discard all readings, because the clock has been set back."""
-        self._repeats = Repeats(self._noises)
+        self._last: Sequence[float] = (math.nan,) * 6
+        self._steps = [math.inf] * 6  # smallest change so far
+        # Whether each value has changed by twice its noise or less: then none of them stops while
+        # all of them change.
+        self._fine = False
+        self._since, self._counts = [0.0] * 6, [1] * 6  # of equal readings
         self._seen = -math.inf  # time of the last position, s
         self._grounded = math.inf
         self._dead = False
@@ -143,34 +88,54 @@ class SensorFaults:
         One that has noise, but repeats itself, is at the least taken to have hardly any.
         """
         new = (force_noise,) * 3 + (position_noise,) * 3
-        self._noises = self._repeats.noises = [
+        self._noises = [
             max(a, LEAST) if b else 0.0 for a, b in zip(new, self._noises, strict=True)
         ]
 
-    def update(
-        self, time: float, readings: Sequence[float], age: float, standing: bool, air: float
-    ) -> Doubt | None:
+    def _stopped(self, time: float, values: Sequence[float]) -> Sequence[int]:
+        """Return which values of a time, s, have not changed for too long, by their places."""
+        last, self._last = self._last, values
+        if self._fine and not any(map(eq, values, last)):
+            self._since, self._counts = [time] * 6, [1] * 6
+            return ()
+        stopped: list[int] = []
+        since, counts, steps = self._since, self._counts, self._steps
+        for place, (value, noise) in enumerate(zip(values, self._noises, strict=True)):
+            if value != last[place]:
+                steps[place] = min(steps[place], abs(value - last[place]))
+                since[place], counts[place] = time, 1
+                continue
+            counts[place] += 1
+            if noise and counts[place] >= FEWEST and time - since[place] > PATIENCE:
+                coarse = 2.0 * noise < steps[place] < math.inf
+                if not coarse or time - since[place] > DEAD:
+                    stopped.append(place)
+        self._fine = all(
+            step <= 2.0 * noise or not noise
+            for step, noise in zip(steps, self._noises, strict=True)
+        )
+        return stopped
+
+    def update(self, time: float, sample: Sample, standing: bool, air: float) -> Doubt | None:
         """Process a sample; return why it cannot be used, or None if it can.
 
         Parameters
         ----------
         time : float
             Time of the sample, s.
-        readings : sequence of 6 floats
-            Force, N, and position, m.
-        age : float
-            Age of the position, s.
+        sample : Sample
+            The sample.
         standing : bool
             Whether the foot stood at the sample before: then its position cannot jump.
         air : float
             Height above which the foot touches nothing, m; infinite if it has not stood yet.
         """
-        last, position = self._repeats.last, readings[3:]
-        if not position[2] <= air < math.inf:
+        last, force, position, age = self._last, sample[:3], sample[4:7], sample.age
+        if not sample.z <= air < math.inf:
             self._grounded = math.inf
         elif self._grounded == math.inf:
             self._grounded = time
-        stopped = self._repeats.update(time, readings)
+        stopped = self._stopped(time, force + position)
         # Markers may be sampled more slowly than forces, so speeds need the positions' own times.
         since, self._seen = self._seen, time - age
         leap = 0.0
@@ -184,7 +149,7 @@ class SensorFaults:
         forces = [place for place in stopped if place < 3]
         marker = self._marker_fault(time, age, stopped[len(forces) :], leap, self._seen - since)
         self.marker_valid = not marker
-        return self._force_fault(time, readings[:3], forces) or marker
+        return self._force_fault(time, force, forces) or marker
 
     def _force_fault(
         self, time: float, force: Sequence[float], stopped: Sequence[int]
@@ -195,7 +160,7 @@ class SensorFaults:
         if len(stopped) == 3:
             if any(force):
                 return Doubt(doubt.STILL, force[2])
-            since = max(self._repeats.since[place] for place in stopped)
+            since = max(self._since[place] for place in stopped)
             grounded = time - max(self._grounded, since)
             # A sensor once found dead also counts as dead in the air, until it reads a force.
             self._dead |= time - since > DEAD or grounded > DEAD_ON_GROUND

@@ -10,21 +10,16 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.foot import (
-    LARGEST_FORCE,
-    LARGEST_POSITION,
-    FeetEstimator,
-    refuse,
-    wrong_numbers,
-)
-from ros_pad.estimation.track import Sample
+from ros_pad.estimation.foot import LARGEST_PRESSURE
+from ros_pad.estimation.friction import GroundModel
+from ros_pad.estimation.ground import Ground
+from ros_pad.estimation.track import LARGEST_FORCE, LARGEST_POSITION, Sample, Track, check
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.pace import CONTROL_PERIOD_NS, Pace
 from ros_pad.records import ESTIMATE, Block
@@ -42,7 +37,7 @@ class _Arrivals:
 
     def __init__(self, tuning: Tuning) -> None:
         self._joints, self._moments = tuning.source == 'joints', tuning.moment_noise > 0.0
-        self._position: Sequence[float] = ()  # last one, m
+        self._position: tuple[float, float, float] | None = None  # last one, m
         self._seen_ns = 0  # stamp of the sample with which that was first used
         self.time = -math.inf  # of the last sample used, s
         self.used = 0  # number of samples used so far
@@ -68,7 +63,7 @@ class _Arrivals:
         if silence > SILENCE:
             self.silence = Doubt(self.missing, silence)
 
-    def take(self, stamp_ns: int, sample: Sample) -> Sample | None:
+    def take(self, stamp_ns: int, numbers: Sequence[float]) -> Sample | None:
         """Return the sample to use of the numbers of a row; None if something is missing.
 
         Raises
@@ -76,38 +71,39 @@ class _Arrivals:
         InvalidInput
             When a number is too large or infinite, or the time does not advance.
         """
-        time, age = stamp_ns * 1e-9, 0.0
-        fx, fy, fz, moment, *position, vx, vy, xx, yy = sample
-        new = math.isfinite(sum(position))
-        if new and max(map(abs, position)) <= LARGEST_POSITION:
-            self.place = position[0], position[1]
+        time, age, variance = stamp_ns * 1e-9, 0.0, 0.0
+        fx, fy, fz, moment, x, y, z, vx, vy, xx, yy = numbers
+        new = math.isfinite(x + y + z)
+        if new and max(abs(x), abs(y), abs(z)) <= LARGEST_POSITION:
+            self.place = x, y
         if fz <= LARGEST_FORCE and not fz <= self.load and fz > -math.inf:
             self.load = fz
-        if math.isnan(fx + fy + fz) and math.inf not in map(abs, (fx, fy, fz)):
+        if fx != fx or fy != fy or fz != fz:  # NaN
             return None
         if self._joints:
             self._miss(doubt.NO_VELOCITY)
             if math.inf in (xx, yy):
                 vx, vy, xx, yy = 0.0, 0.0, math.inf, math.inf
+            variance = max(xx, yy)
             if not new or math.isnan(xx + yy) or math.isnan(vx + vy):
                 return None
         else:
-            vx = vy = xx = yy = 0.0
+            vx = vy = 0.0
         if not new:
             self._miss(doubt.NO_POSITION)
             if not self._position:
                 return None
-            position, age = [*self._position], abs(time - self._seen_ns * 1e-9)
-        moment = moment if self._moments else math.nan
-        found = fx, fy, fz, moment, *position, vx, vy, xx, yy, age
-        wrong = wrong_numbers(time, found)
-        if new and not wrong:
-            self._position, self._seen_ns = position, stamp_ns
-        refuse(time, self.time, wrong)
+            (x, y, z), age = self._position, abs(time - self._seen_ns * 1e-9)
+        sample = Sample(
+            fx, fy, fz, moment if self._moments else math.nan, x, y, z, vx, vy, variance, age
+        )
+        check(sample, time, self.time)
+        if new:
+            self._position, self._seen_ns = (x, y, z), stamp_ns
         self.time = time
         self.used += 1
         self._use()
-        return found
+        return sample
 
     def _miss(self, code: int) -> None:
         if self.missing != doubt.REFUSED:
@@ -139,8 +135,10 @@ class EstimationStage:
 
     Attributes
     ----------
-    estimator : FeetEstimator
-        Estimator of the feet.
+    model : GroundModel
+        What is assumed of the ground, and what the feet learn of friction together.
+    tracks : list of Track
+        What each foot does, and knows of the ground.
     samples : int
         Number of moments used so far, in which at least one foot had a sample that could be used.
     last_ns : int
@@ -156,16 +154,17 @@ class EstimationStage:
         period_ns: int = CONTROL_PERIOD_NS,
         reject: Callable[[int, InvalidInput], None] | None = None,
     ) -> None:
-        self.estimator = FeetEstimator(len(legs), foot, expected_load, tuning)
+        self.model = GroundModel.of(foot, expected_load, tuning)
+        self.tracks = [Track(Ground(foot, expected_load, tuning, self.model)) for _ in legs]
         self._legs, self._reject, self._pace = legs, reject, Pace(period_ns)
         self._arrivals = [_Arrivals(tuning) for _ in legs]
         self._pressures = [0.0] * len(legs)
         self.samples = self.last_ns = 0
 
-    def pressure(self, rows: np.ndarray) -> None:
-        """Store gauge pressures of the pads, rows of PRESSURE; not NaN and beyond 1e7 Pa."""
-        for place, gauge in enumerate(rows['pressure'].tolist()):
-            if abs(gauge) <= 1e7:
+    def pressure(self, record: Block) -> None:
+        """Store gauge pressures of a PRESSURE record, unless missing or too large."""
+        for place, gauge in enumerate(record.rows[-1]['pressure'].tolist()):
+            if abs(gauge) <= LARGEST_PRESSURE:
                 self._pressures[place] = gauge
 
     def process(self, block: Block) -> list[Block]:
@@ -173,9 +172,8 @@ class EstimationStage:
         numbers = np.ascontiguousarray(block.rows).view(float).reshape(*block.rows.shape, -1)
         found = []
         for stamp_ns, moment in zip(block.stamps.tolist(), numbers.tolist(), strict=True):
-            samples = [self._take(place, stamp_ns, each) for place, each in enumerate(moment)]
-            self.estimator.update(stamp_ns * 1e-9, samples, self._pressures)
-            if any(samples):
+            used = [self._use(place, stamp_ns, each) for place, each in enumerate(moment)]
+            if any(used):
                 self.samples += 1
                 self.last_ns = stamp_ns
             # Who waits for an estimate receives one, also of feet without samples.
@@ -186,37 +184,32 @@ class EstimationStage:
         return found
 
     @property
-    def used(self) -> npt.NDArray[np.int64]:
+    def used(self) -> list[int]:
         """Number of samples used so far, by foot."""
-        return np.array([each.used for each in self._arrivals])
+        return [each.used for each in self._arrivals]
 
-    def _take(self, place: int, stamp_ns: int, sample: Sample) -> Sample | None:
-        """Return the sample of a foot to use, if there is one."""
+    def _use(self, place: int, stamp_ns: int, numbers: Sequence[float]) -> bool:
+        """Process the row of a foot; return whether it could be used."""
         try:
-            return self._arrivals[place].take(stamp_ns, sample)
+            sample = self._arrivals[place].take(stamp_ns, numbers)
         except InvalidInput as error:
             self._arrivals[place].missing = doubt.REFUSED
             if self._reject:
                 self._reject(self._legs[place], error)
-            return None
+            return False
+        if sample:
+            self.tracks[place].update(stamp_ns * 1e-9, sample, self._pressures[place])
+        return bool(sample)
 
     def tick(self, now_ns: int) -> None:
         """Check at a time, ns, whether samples are missing; call it every `TICK_PERIOD_NS`."""
         for each in self._arrivals:
             each.tick(now_ns)
 
-    @property
-    def doubts(self) -> list[Doubt]:
-        """Why the ground below each foot is unobservable."""
-        return [
-            each.silence or track.ground.doubt
-            for each, track in zip(self._arrivals, self.estimator.tracks, strict=True)
-        ]
-
     def estimate(self, stamp_ns: int) -> Block:
         """Return the present estimates as a record of a time, ns."""
         table = []
-        for each, track in zip(self._arrivals, self.estimator.tracks, strict=True):
+        for each, track in zip(self._arrivals, self.tracks, strict=True):
             now, ground = track.standing, track.ground
             table.append((
                 *each.place, each.load, *now.slip_velocity, now.slip_speed, track.slip.sd,

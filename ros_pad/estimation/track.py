@@ -7,20 +7,18 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ros_pad.contact.resistance import Foot
+from ros_pad.configuration import shown
+from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
-from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.axes import BLOCK, Axes
+from ros_pad.estimation.alarm import BODY_CORRELATION, Slip
+from ros_pad.estimation.axes import BLOCK, Axes, Vector
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.ground import LONGEST_GAP, Ground
-from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.sensor_faults import SensorFaults
-from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import Watch
 
-Sample = Sequence[float]
-"""Numbers of a row of :data:`ros_pad.records.SAMPLE`: force, N, moment, N m, position, m,
-velocity, m/s, and its variances, m²/s²; last the age of the position, s."""
+LOAD_GATE = 0.1
+"""Share of the expected load above which a foot stands."""
 
 AIRBORNE_LOAD = 0.3
 """Share of the expected load above which a foot at that height may stand on higher ground. Smaller
@@ -29,12 +27,82 @@ readings there are the offset of the sensor."""
 AIRBORNE = 0.01
 """Rise above the height of its last stance, m, from which on a foot certainly touches nothing."""
 
-BODY_CORRELATION = 0.15
-"""Time over which errors of a measured velocity of the contact are the same, s: that of the body,
-which is common to all feet, lasts for about a stance."""
-
 TARE_TIME = 0.5
 """Time over which the force of a foot in the air is averaged, s."""
+
+LARGEST_FORCE, LARGEST_POSITION = 1e5, 1e6
+"""Largest size of a force, N, or moment, N m, and of a position, m. A larger value, though finite,
+would spoil sums and means for ever."""
+
+
+class Sample(NamedTuple):
+    """What the sensors of a foot read at a moment.
+
+    Attributes
+    ----------
+    fx, fy, fz : float
+        Force of the ground on the foot, N; z is the normal force.
+    moment : float
+        Yaw moment, N m; NaN if it is not measured.
+    x, y, z : float
+        Position of the marker, or of the foot in odom, m.
+    vx, vy : float
+        Velocity of the contact over the floor, m/s; 0 with markers.
+    variance : float
+        Variance of its components, m²/s²; infinite if it must not be used, 0 with markers.
+    age : float
+        Age of the position, s.
+    """
+
+    fx: float
+    fy: float
+    fz: float
+    moment: float
+    x: float
+    y: float
+    z: float
+    vx: float = 0.0
+    vy: float = 0.0
+    variance: float = 0.0
+    age: float = 0.0
+
+
+_LIMITS = (
+    *((f'force {axis}', -LARGEST_FORCE, LARGEST_FORCE, 'N') for axis in 'xyz'),
+    ('moment', -LARGEST_FORCE, LARGEST_FORCE, 'N m'),
+    *((f'position {axis}', -LARGEST_POSITION, LARGEST_POSITION, 'm') for axis in 'xyz'),
+    *((f'velocity {axis}', -1e6, 1e6, 'm/s') for axis in 'xy'),
+    ('variance', 0.0, math.inf, 'm²/s²'),
+    ('age of the position', 0.0, 1e12, 's'),
+)
+
+
+def check(sample: Sample, time: float, last: float) -> None:
+    """Refuse a sample of a time, s, with wrong numbers, or hardly later than the last one, s.
+
+    Raises
+    ------
+    InvalidInput
+        When a number is too large or not finite, or the time does not advance: no clock is set
+        back by so little.
+    """
+    wrong = [
+        f'{name} = {shown(value)} {unit}'
+        for (name, low, high, unit), value in zip(_LIMITS, sample, strict=True)
+        if not (low <= value <= high or (name == 'moment' and value != value))
+    ]
+    if not abs(time) < math.inf:
+        wrong.append(f'time = {shown(time)} s')
+    if wrong:
+        raise InvalidInput(
+            f'sample at {shown(time)} s: {", ".join(wrong)}: must be finite, and not larger than'
+            ' a sensor can show'
+        )
+    if last - LONGEST_GAP < time <= last:
+        raise InvalidInput(
+            f'time = {shown(time)} s is not allowed: it must be later than that of the last'
+            f' sample, {shown(last)} s'
+        )
 
 
 class Offset:
@@ -55,16 +123,17 @@ class Offset:
         self.sd = 0.05 * expected_load
         self.known, self._air_time = False, 0.0
 
-    def update(self, dt: float, fx: float, fy: float, fz: float, moment: float) -> None:
-        """Process forces, N, and a torque, N m, read in the air dt seconds after the last ones."""
+    def update(self, dt: float, sample: Sample) -> None:
+        """Process a sample read in the air dt seconds after the last one."""
         # This is a plain mean at first, and an exponential one after TARE_TIME.
         dt = min(dt, TARE_TIME)
         self._air_time += dt
         self.known = True
         share = dt / min(TARE_TIME + dt, self._air_time)
-        self.x += share * (fx - self.x)
-        self.y += share * (fy - self.y)
-        self.z += share * (fz - self.z)
+        self.x += share * (sample.fx - self.x)
+        self.y += share * (sample.fy - self.y)
+        self.z += share * (sample.fz - self.z)
+        moment = 0.0 if math.isnan(sample.moment) else sample.moment
         self.moment += share * (moment - self.moment)
         self.sd *= 1.0 - share
 
@@ -94,69 +163,6 @@ class Heights:
             self.last = self.base  # the ground cannot rise with the foot
             return True
         return light and height > self.air
-
-
-class Slip:
-    """Slip of the contact of a foot.
-
-    Attributes
-    ----------
-    softness : float
-        Motion of the point whose motion is measured against the contact, by force, m/N.
-    alarm : SlipAlarm
-        Slip alarm.
-    sd : float
-        Standard deviation of the last slip speed, m/s; infinite while it is not known.
-    noise, contact_noise : float
-        That of the slip speed without the body's, m/s, and of a coordinate of the contact, m.
-    """
-
-    def __init__(self, foot: Foot, tuning: Tuning) -> None:
-        self._tuning, self._joints = tuning, tuning.source == 'joints'
-        self._shear = 1.0 / foot.shear_stiffness
-        self.softness = self._shear if tuning.pads_shear or not self._joints else 0.0
-        memory = BODY_CORRELATION if self._joints else tuning.smoothing
-        self.alarm = SlipAlarm(memory, threshold=tuning.alarm_threshold)
-        # Smoothed position of the contact, m; with joints smoothed shear of the pads.
-        self._x = self._y = self.noise = self.contact_noise = self.sd = 0.0
-
-    def set_noise(self, position: float, force: float) -> None:
-        """Use the noise of a coordinate, m, and of a component of the force, N."""
-        self.contact_noise = math.hypot(position, force * self.softness)
-        speed = self.contact_noise / self._tuning.smoothing
-        self.noise = math.hypot(speed, self._tuning.speed_noise)
-
-    def contact(self, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
-        """Return the contact, m: the marker is above the soft pad, which a force, N, shears."""
-        return x + fx * self._shear, y + fy * self._shear
-
-    def touch_down(self, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
-        """Begin a stance; return the contact, m."""
-        contact = self.contact(x, y, fx, fy)
-        sheared = fx * self.softness, fy * self.softness
-        self._x, self._y = sheared if self._joints else contact
-        self.alarm.reset()
-        return contact
-
-    def update(self, dt: float, force: Sequence[float], sample: Sample) -> tuple[float, ...]:
-        """Process a sample and its force without offset, N; return speed, m/s, and place, m."""
-        (fx, fy, _), (x, y, _, vx, vy, xx, yy, _) = force, sample[4:]
-        smoothing = self._tuning.smoothing
-        x, y = self.contact(x, y, fx, fy)
-        to_x, to_y = (fx * self.softness, fy * self.softness) if self._joints else (x, y)
-        share = dt / (smoothing + dt)
-        self._x += share * (to_x - self._x)
-        self._y += share * (to_y - self._y)
-        rate_x, rate_y = (to_x - self._x) / smoothing, (to_y - self._y) / smoothing
-        self.sd = self.noise
-        if self._joints:
-            self.sd = math.hypot(self.noise, math.sqrt(max(xx, yy)))
-            rate_x, rate_y = vx + rate_x, vy + rate_y
-        else:
-            x, y = self._x, self._y
-        pull = math.sqrt(fx * fx + fy * fy)
-        # A foot gives way against its tangential force; the rest of its speed is only noise.
-        return -(rate_x * fx + rate_y * fy) / pull if pull > 0.0 else 0.0, x, y
 
 
 class Window:
@@ -248,7 +254,7 @@ class Track:
         Whether its sensors can be used.
     fresh : bool
         Whether the last sample updated wetness and friction, or was the first of a swing or of a
-        fault; only ever set here.
+        fault.
     last : Standing or None
         Last sample of its last stance; None from a fault of its sensors until it stands again.
     slip : Slip
@@ -264,7 +270,7 @@ class Track:
         self.ground, self.slip = ground, Slip(ground.foot, tuning)
         memory = BODY_CORRELATION if self._joints else BLOCK
         axes = Axes(load, self.slip.softness, memory)
-        self.watch = Watch(SensorNoise(marker, tuning.force_noise, load), axes)
+        self.watch = Watch(marker, tuning.force_noise, load, axes)
         self._offset, self._heights = Offset(load), Heights()
         self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m
         self._window, self.time, self.stands = Window(0.0), -math.inf, False
@@ -285,59 +291,52 @@ class Track:
 
     def update(self, time: float, sample: Sample, pressure: float) -> None:
         """Process a sample of a time, s, with a pressure in the pads, Pa."""
-        fx, fy, fz, moment, x, y, z, vx, vy, xx, yy, age = sample
-        variance = max(xx, yy) if self._joints else 0.0
+        self.fresh = False
+        known = sample.variance < math.inf
         dt = time - self.time
         if dt <= 0.0:
             dt = self._set_back()
         # With the body in doubt odom may begin anew: no leap of a foot.
-        steady, air = self.stands and variance < math.inf, self._heights.air
-        fault = self._faults.update(time, (fx, fy, fz, x, y, z), age, steady, air)
+        fault = self._faults.update(time, sample, self.stands and known, self._heights.air)
         if fault:
             self.watch.restart()
             self._lose(time, fault)
             return
-        offset, tuning = self._offset, self.ground.tuning
-        load, least = fz - offset.z, AIRBORNE_LOAD * self.ground.expected_load
-        if self._heights.aloft(self.stands, load < least, z):
-            known = tuning.moment_noise > 0.0 and moment == moment
-            offset.update(dt, fx, fy, fz, moment if known else 0.0)
+        offset, expected_load = self._offset, self.ground.expected_load
+        load = sample.fz - offset.z
+        if self._heights.aloft(self.stands, load < AIRBORNE_LOAD * expected_load, sample.z):
+            offset.update(dt, sample)
             load = 0.0
-        if self._joints:
-            moved = min(dt, BLOCK)
-            x, y = self._slid = self._slid[0] + vx * moved, self._slid[1] + vy * moved
-        if self.watch.looks:
-            self.watch.readings.append((time, x, y, fx, fy, fz))
-        if time >= self.watch.end:
-            self._end_block(time, sample, math.sqrt(variance) if self._joints else None)
+        force = sample.fx - offset.x, sample.fy - offset.y, sample.fz - offset.z
+        self._look(time, dt, sample, force)
         if self.watch.axes.doubt.code:
             self._lose(time, self.watch.axes.doubt)
             return
         if not self.sound:
             self.ground.doubt = Doubt(doubt.NOT_AGAIN)
-        stood, self.stands = self.stands, load >= tuning.load_gate * self.ground.expected_load
+        stood, self.stands = self.stands, load >= LOAD_GATE * expected_load
         if not self.stands:
-            self.fresh |= stood or not self.sound
+            self.fresh = stood or not self.sound
             self.sound, self.watch.looks, self.time = True, False, time
-            body_sd = math.sqrt(variance) if variance < math.inf else 0.0
+            body_sd = math.sqrt(sample.variance) if known else 0.0
             self.slip.sd = math.hypot(body_sd, self.slip.noise)
             return
-        if not stood or dt > LONGEST_GAP:
-            self._touch_down(time, sample, pressure)
-        self.fresh |= not stood and variance == math.inf
         self.sound = True
+        if not stood or dt > LONGEST_GAP:
+            self._touch_down(time, sample, force, pressure)
+        if known:
+            self._stand(time, sample, force, pressure)
+            return
+        # While the motion of the body is in doubt, there is no alarm, and nothing is learnt.
         peak = self._window.peak
-        if variance == math.inf:
-            self._window = Window(time)
-        self._stand(time, sample, pressure)
-        if variance == math.inf:
-            # While the motion of the body is in doubt, there is no alarm, and nothing is learnt.
-            self._window = Window(time, True, peak)
-            self.slip.alarm.reset()
-            assert self.last
-            self.last = self.last._replace(slip_speed=0.0, turning=0.0, slipping=False)
-            self.fresh |= self.ground.doubt.code != doubt.MOTION
-            self.ground.doubt = Doubt(doubt.MOTION)
+        self._window = Window(time)
+        self._stand(time, sample, force, pressure)
+        self._window = Window(time, True, peak)
+        self.slip.alarm.reset()
+        assert self.last
+        self.last = self.last._replace(slip_speed=0.0, turning=0.0, slipping=False)
+        self.fresh |= not stood or self.ground.doubt.code != doubt.MOTION
+        self.ground.doubt = Doubt(doubt.MOTION)
 
     def _set_back(self) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
@@ -346,26 +345,34 @@ class Track:
         self.watch.restart()
         return math.inf
 
-    def _end_block(self, time: float, sample: Sample, speed_sd: float | None) -> None:
-        """End a block of readings."""
-        watch, offset = self.watch, self._offset
+    def _look(self, time: float, dt: float, sample: Sample, force: Vector) -> None:
+        """Watch over the sensors; the force is without offset, N."""
+        watch, offset, x, y = self.watch, self._offset, sample.x, sample.y
+        speed_sd = None
+        if self._joints:
+            moved, speed_sd = min(dt, BLOCK), math.sqrt(sample.variance)
+            x, y = self._slid = (
+                self._slid[0] + sample.vx * moved,
+                self._slid[1] + sample.vy * moved,
+            )
+        if watch.looks:
+            watch.readings.append((time, x, y, sample.fx, sample.fy, sample.fz))
+        if time < watch.end:
+            return
         was = watch.axes.doubt.code
-        force = sample[0] - offset.x, sample[1] - offset.y, sample[2] - offset.z
         known = (offset.x, offset.y) if offset.known else None
-        if watch.end_block(time, sample[6], force, known, self.stands, speed_sd):
-            noise = watch.noise
-            self._faults.set_noise(noise.force.white, noise.position.white)
-            self.slip.set_noise(noise.position.noise, noise.force.noise)
+        if watch.end_block(time, sample.z, force, known, self.stands, speed_sd):
+            self._faults.set_noise(watch.force.white, watch.position.white)
+            self.slip.set_noise(watch.position.noise, watch.force.noise)
         if watch.axes.doubt.code and not was:
             watch.looks = True
             self.ground.forget(time)
 
-    def _touch_down(self, time: float, sample: Sample, pressure: float) -> None:
+    def _touch_down(self, time: float, sample: Sample, force: Vector, pressure: float) -> None:
         """Begin a stance."""
-        fx, fy = sample[0] - self._offset.x, sample[1] - self._offset.y
         self.watch.look(time)
-        self._heights.base = sample[6]
-        x, y = self.slip.touch_down(sample[4], sample[5], fx, fy)
+        self._heights.base = sample.z
+        x, y = self.slip.touch_down(sample, force[0], force[1])
         self.ground.touch_down(time, x, y, pressure)
         self._window = Window(time)
 
@@ -380,24 +387,19 @@ class Track:
         self.ground.doubt = why
         self.sound, self.last, self.slip.sd, self.time = False, None, math.inf, time
 
-    def _stand(self, time: float, sample: Sample, pressure: float) -> None:
+    def _stand(self, time: float, sample: Sample, force: Vector, pressure: float) -> None:
         """Process a sample of a standing foot, which may end a window."""
-        offset, tuning, ground, slip = self._offset, self.ground.tuning, self.ground, self.slip
-        moment, dt = sample[3], time - self.time
-        fx, fy, fz = force = sample[0] - offset.x, sample[1] - offset.y, sample[2] - offset.z
-        if not 0.0 < dt < math.inf:
-            dt = 0.1 * tuning.smoothing
-        speed, *place = slip.update(dt, force, sample)
-        turning, known = 0.0, tuning.moment_noise > 0.0 and moment == moment
+        ground, slip, (fx, fy, fz) = self.ground, self.slip, force
+        speed, slipping, place = slip.update(time - self.time, sample, fx, fy)
+        turning, known = 0.0, not math.isnan(sample.moment)
         if known:
-            turning = abs(moment - offset.moment) / ground.foot.turning_radius
+            turning = abs(sample.moment - self._offset.moment) / ground.foot.turning_radius
         self._window.add(fz, math.sqrt(fx * fx + fy * fy), turning, speed, slip.sd)
         if fz >= AIRBORNE_LOAD * ground.expected_load:
-            self._heights.last = sample[6]
-        slipping = slip.alarm.update(speed, slip.sd, dt)
+            self._heights.last = sample.z
         self.last, self.time = Standing(speed, fx, fy, fz, turning, slipping), time
-        if time >= tuning.filter_period + (self._window.start - 1e-9):
-            noises = self.watch.noise.force.noise, offset.sd, slip.contact_noise
+        if time >= ground.tuning.filter_period + (self._window.start - 1e-9):
+            noises = self.watch.force.noise, self._offset.sd, slip.contact_noise
             ground.end_window(time, self._window, place, pressure, noises, known)
             self._window = Window(time, False, self._window.peak)
             self.fresh = True

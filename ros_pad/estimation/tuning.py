@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import inspect
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-from ros_pad.configuration import Setting
-from ros_pad.contact.resistance import Foot
-from ros_pad.estimation.alarm import THRESHOLD
+from ros_pad.configuration import Setting, choice, instance
 from ros_pad.estimation.scales import CLASSES, SCALE_RANGE, SCALE_SD, SCALE_SD_RANGE, Scale
 
 EXPECTED_LOAD = Setting(
@@ -21,22 +19,10 @@ SOURCES = ('markers', 'joints')
 """Where slip comes from."""
 
 
-def attribute(setting: Setting) -> str:
-    """Return the attribute of :class:`Tuning` that holds a setting."""
-    return setting.name.replace('.', '_')
-
-
 def _field(*given: Any, **more: Any) -> Any:
-    """Return a field of a dataclass with a setting."""
-    setting = Setting(*given, **more)
+    """Return a field of a dataclass with a setting, which is named after it."""
+    setting = Setting('', *given, **more)
     return field(default=setting.default, metadata={'setting': setting})
-
-
-def _described(setting: Setting) -> str:
-    kind = setting.value_type.__name__
-    unit = ', no unit' if kind == 'float' and not setting.unit else ''
-    values = f'Allowed: {setting.allowed}{unit}; default: {setting.default}.'
-    return f'{attribute(setting)} : {kind}\n    {setting.description} {values}\n'
 
 
 @dataclass(frozen=True)
@@ -57,136 +43,88 @@ class Tuning:
 
     # fmt: off
     position_noise: float = _field(
-        'position_noise', 1.5e-4,
-        'Standard deviation of a marker coordinate, until it is measured; 0: readings may repeat.',
-        'm', 0.0, 0.1,
-    )
+        1.5e-4, 'Standard deviation of a marker coordinate, until it is measured; 0: readings may'
+        ' repeat.', 'm', 0.0, 0.1)
     force_noise: float = _field(
-        'force_noise', 0.03,
-        'Standard deviation of a force component, until it is measured; 0: readings may repeat.',
-        'N', 0.0, 100.0,
-    )
+        0.03, 'Standard deviation of a force component, until it is measured; 0: readings may'
+        ' repeat.', 'N', 0.0, 100.0)
     moment_noise: float = _field(
-        'moment_noise', 0.0,
-        'Standard deviation of the torque z of a wrench; 0: the sensors do not measure it.',
-        'N m', 0.0, 10.0,
-    )
+        0.0, 'Standard deviation of the torque z of a wrench; 0: the sensors do not measure it.',
+        'N m', 0.0, 10.0)
     force_range: float = _field(
-        'force_range', 0.0,
-        'Largest component of force that a sensor can show; 0: not known.', 'N', 0.0, 1e5,
-    )
-    load_gate: float = _field(
-        'load_gate', 0.1, 'Share of the expected load above which a foot stands.',
-        '', 0.001, 1.0,
-    )
-    smoothing: float = _field(
-        'smoothing', 0.02, 'Time constant of the slip speed.', 's', 0.001, 10.0
-    )
+        0.0, 'Largest component of force that a sensor can show; 0: not known.', 'N', 0.0, 1e5)
     filter_period: float = _field(
-        'filter_period', 0.04, 'Time between updates of the wetness and friction filter.',
-        's', 0.001, 10.0,
-    )
+        0.04, 'Time between updates of the wetness and friction filter.', 's', 0.001, 10.0)
     patch_length: float = _field(
-        'patch_length', 1.5, 'Distance over which wet and dry ground change.', 'm', 0.01, 100.0,
-    )
-    wet_prior: float = _field(
-        'wet_prior', 0.5, 'Prior probability of wet ground.', '', 0.01, 0.99,
-    )
-    ratio_noise: float = _field(
-        'ratio_noise', 0.03, 'Model error of T/N, added to that of the sensors.', '', 1e-4, 10.0,
-    )
-    speed_noise: float = _field(
-        'speed_noise', 2e-3,
-        'Model error of the slip speed, added to that of the sensors: feet also roll and bend.',
-        'm/s', 1e-6, 1.0,
-    )
+        1.5, 'Distance over which wet and dry ground change.', 'm', 0.01, 100.0)
+    wet_prior: float = _field(0.5, 'Prior probability of wet ground.', '', 0.01, 0.99)
     turning_rate: float = _field(
-        'turning_rate', 4.0,
-        'Root mean square of the rate at which a standing foot turns about the vertical; for legs'
-        ' without an ankle, the speed of the body over the length of the leg.',
-        'rad/s', 0.0, 100.0,
-    )
+        4.0, 'Root mean square of the rate at which a standing foot turns about the vertical; for'
+        ' legs without an ankle, the speed of the body over the length of the leg.',
+        'rad/s', 0.0, 100.0)
     alarm_threshold: float = _field(
-        'alarm.threshold', THRESHOLD,
-        'Threshold of the slip alarm: on average at least exp(threshold) samples lie between false'
-        ' alarms.',
-        'nats', 0.1, 100.0,
-    )
+        4.0, 'Threshold of the slip alarm: on average at least exp(threshold) samples lie between'
+        ' false alarms.', 'nats', 0.1, 100.0)
     source: str = _field(
-        'source', 'markers',
-        'Where slip comes from: positions of markers, or velocities of contact points with their'
-        ' variances, which a body estimator has from joints and IMU.',
-        choices=SOURCES,
-    )
+        'markers', 'Where slip comes from: positions of markers, or velocities of contact points'
+        ' with their variances, which a body estimator has from joints and IMU.', choices=SOURCES)
     pads_shear: bool = _field(
-        'pads_shear', True,
-        'With source joints: whether pads that shear move the link above them, as on a robot; the'
-        ' joints of simulated robots are those of rigid feet.',
-    )
+        True, 'With source joints: whether pads that shear move the link above them, as on a'
+        ' robot; the joints of simulated robots are those of rigid feet.')
     learn_friction: bool = _field(
-        'learn_friction', True,
-        'Whether the feet learn how much the friction of their floor differs from the contact'
-        ' model.',
-    )
-    scale_flat_dry: float = _field(
-        'scale.flat_dry', 1.0,
-        'Expected friction over that of the contact model, flat and dry.',
-        '', *SCALE_RANGE,
-    )
-    scale_flat_wet: float = _field(
-        'scale.flat_wet', 1.0,
-        'Expected friction over that of the contact model, flat and wet.',
-        '', *SCALE_RANGE,
-    )
-    scale_dome: float = _field(
-        'scale.dome', 1.0,
-        'Expected friction over that of the contact model, dome.',
-        '', *SCALE_RANGE,
-    )
-    scale_sd_flat_dry: float = _field(
-        'scale_sd.flat_dry', SCALE_SD, 'Standard deviation of the logarithm of scale.flat_dry.',
-        '', *SCALE_SD_RANGE,
-    )
-    scale_sd_flat_wet: float = _field(
-        'scale_sd.flat_wet', SCALE_SD, 'Standard deviation of the logarithm of scale.flat_wet.',
-        '', *SCALE_SD_RANGE,
-    )
-    scale_sd_dome: float = _field(
-        'scale_sd.dome', SCALE_SD, 'Standard deviation of the logarithm of scale.dome.',
-        '', *SCALE_SD_RANGE,
-    )
+        True, 'Whether the feet learn how much the friction of their floor differs from the'
+        ' contact model.')
     # fmt: on
+    scales: Mapping[str, Scale] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        instance('scales', self.scales, Mapping)
+        for name in self.scales:
+            choice('scales', name, CLASSES)
+        object.__setattr__(self, 'scales', dict.fromkeys(CLASSES, Scale()) | dict(self.scales))
+        values = self.values
         for setting in SETTINGS:
-            setting.accept(getattr(self, attribute(setting)))
+            setting.accept(values[setting.name])
 
-    @property
-    def scales(self) -> dict[str, Scale]:
-        """What is known of the scales of friction before a walk, by class."""
-        return {
-            name: Scale(getattr(self, f'scale_{name}'), getattr(self, f'scale_sd_{name}'))
-            for name in CLASSES
-        }
-
-    def rim_speed(self, foot: Foot) -> float:
-        """Return the scrubbing speed of a turning foot at 2/3 of the sole's radius.
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Tuning:
+        """Return the tuning with these values of all settings, by name; others are ignored.
 
         Parameters
         ----------
-        foot : Foot
-            The foot.
+        values : mapping
+            Values by the names of :data:`SETTINGS`.
 
         Returns
         -------
-        float
-            Speed, m/s.
+        Tuning
+            The tuning.
         """
-        return foot.turning_radius * self.turning_rate
+        scales = {n: Scale(values[f'scale.{n}'], values[f'scale_sd.{n}']) for n in CLASSES}
+        own = {attribute: values[each.name] for attribute, each in _OWN.items()}
+        return cls(**own, scales=scales)
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values of all settings by name; :meth:`of` takes them."""
+        return {
+            **{each.name: getattr(self, attribute) for attribute, each in _OWN.items()},
+            **{f'scale.{name}': scale.scale for name, scale in self.scales.items()},
+            **{f'scale_sd.{name}': scale.sd for name, scale in self.scales.items()},
+        }
 
 
-SETTINGS: tuple[Setting, ...] = tuple(each.metadata['setting'] for each in fields(Tuning))
-"""Settings of an estimator; an attribute of :class:`Tuning` has ``_`` in place of a dot."""
-
-Tuning.__doc__ = f'{inspect.cleandoc(Tuning.__doc__ or "")}\n\nAttributes\n----------\n'
-Tuning.__doc__ += ''.join(map(_described, SETTINGS))
+_OWN: dict[str, Setting] = {
+    each.name: replace(each.metadata['setting'], name=each.name.replace('alarm_', 'alarm.'))
+    for each in fields(Tuning)
+    if each.metadata
+}
+SETTINGS: tuple[Setting, ...] = (
+    *_OWN.values(),
+    *(Setting(f'scale.{name}', 1.0, 'Expected friction over that of the contact model,'
+              f' {name.replace("_", " and ")}.', '', *SCALE_RANGE) for name in CLASSES),
+    *(Setting(f'scale_sd.{name}', SCALE_SD, 'Standard deviation of the logarithm of'
+              f' scale.{name}.', '', *SCALE_SD_RANGE) for name in CLASSES),
+)  # fmt: skip
+"""Settings of an estimator, as in parameters, sweeps and replays. An attribute of :class:`Tuning`
+has ``_`` in place of a dot; the last six are in its ``scales``."""

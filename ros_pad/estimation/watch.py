@@ -4,14 +4,38 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Sequence
+from itertools import compress, pairwise
+from operator import mul, sub
+
+import numpy as np
 
 from ros_pad.estimation.axes import BLOCK, LONGEST, Axes, Vector
 from ros_pad.estimation.ground import LONGEST_GAP
-from ros_pad.estimation.noise import SensorNoise
+from ros_pad.estimation.noise import Meter, changes
 
 EAGER, PAUSE = 10, 8
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
 Stances are counted anew each second."""
+
+LAG = 2
+"""Blocks between those that are compared: noise that is correlated over one of them counts."""
+
+EAGER_BLOCKS, BLOCK_PAUSE = 12, 3
+"""Blocks that are all measured at first, and of how many one is measured later."""
+
+READINGS = 8
+"""Last readings of a window in which second differences are taken."""
+
+STEADY = 0.03
+"""Change of the force over blocks up to which a foot is at rest, share of the expected load."""
+
+STILL = 1e-3
+"""Motion over blocks, m, up to which a foot is at rest: one that slips at 5 mm/s moves so far."""
+
+_UNEVEN = 0.5
+"""Relative change of the sampling period above which no second difference is taken."""
 
 
 class Watch:
@@ -19,14 +43,18 @@ class Watch:
 
     Parameters
     ----------
-    noise : SensorNoise
-        Noise of the sensors.
+    position_noise, force_noise : float
+        Configured standard deviations of a component, m and N; 0: not measured.
+    expected_load : float
+        Normal force in stance, N.
     axes : Axes
-        Doubt of their axes.
+        Doubt of the axes.
 
     Attributes
     ----------
-    noise, axes
+    position, force : Meter
+        Noise of a coordinate, m, and of a component of the force, N.
+    axes : Axes
         As given.
     end : float
         Time at which the present block ends, s.
@@ -36,8 +64,14 @@ class Watch:
         Whether noise is measured, and motions are compared, in this stance.
     """
 
-    def __init__(self, noise: SensorNoise, axes: Axes) -> None:
-        self.noise, self.axes = noise, axes
+    def __init__(
+        self, position_noise: float, force_noise: float, expected_load: float, axes: Axes
+    ) -> None:
+        self.position, self.force = Meter(position_noise), Meter(force_noise)
+        self._steady = STEADY * expected_load
+        self.axes = axes
+        self._blocks: deque[tuple[Sequence[float], int]] = deque(maxlen=2 * LAG + 1)
+        self._measured = 0  # blocks
         self._looked, self.looks, self._look_end = 0, False, math.inf
         self.restart()
 
@@ -57,7 +91,7 @@ class Watch:
         self.looks = self._looked <= EAGER or self._looked % PAUSE == 0
         self._look_end = time + LONGEST
         self.readings, self._earlier = [], 0
-        self.noise.begin()
+        self._blocks.clear()
 
     def end_block(
         self,
@@ -97,14 +131,65 @@ class Watch:
         if self.looks and count:
             columns = [*zip(*block, strict=True)]
             means = [sum(each[earlier:]) / count for each in columns[1:]]
-            measured = stands and self.noise.add(columns, means, count)
+            measured = stands and self._measure(columns, means, count)
             if loaded and offset:
-                x, y, fx, fy, _ = means
-                sd = self.noise.position.noise * math.sqrt(2.0 / count)
+                sd = self.position.noise * math.sqrt(2.0 / count)
                 if speed_sd is not None:
                     sd = speed_sd * BLOCK
-                dx, dy = offset
-                self.axes.compare(columns[0][-1], duration, x, y, fx - dx, fy - dy, sd)
+                place, pull = np.array(means[:2]), np.array(means[2:4]) - offset
+                self.axes.compare(columns[0][-1], duration, place, pull, sd)
         if stands and time > self._look_end:
             self.look(time)
         return measured
+
+    def _measure(
+        self, readings: Sequence[Sequence[float]], means: Sequence[float], count: int
+    ) -> bool:
+        """Process a block of a standing foot; return whether noise was measured in it.
+
+        ``readings`` has a column each of times, s, positions x and y, m, and forces x, y and z, N,
+        which may begin before the block; ``means`` are those of so many readings of the block
+        itself, without the times.
+        """
+        self._blocks.append((means, count))
+        self._measured += 1
+        _, x, y, *forces = readings
+        self.position.add_changes(x, y)
+        self.force.add_changes(*forces)
+        if self._measured > EAGER_BLOCKS and self._measured % BLOCK_PAUSE:
+            return False
+        times, x, y, *forces = (each[-READINGS:] for each in readings)
+        steps = changes(times)
+        even = [abs(b - a) <= _UNEVEN * b for a, b in pairwise(steps)]
+        bends = sum(even)
+        if bends < 2:
+            return False
+        if self.position.configured:
+            self.position.add_window(_bent(x, even) + _bent(y, even), 2 * bends)
+        if self.force.configured:
+            self.force.add_window(sum(_bent(each, even) for each in forces), 3 * bends)
+        if len(self._blocks) > 2 * LAG:
+            self._compare_blocks()
+        return True
+
+    def _compare_blocks(self) -> None:
+        """Compare means over blocks, if the foot was at rest in them."""
+        last, count = self._blocks[-1]
+        noise = 4.0 / math.sqrt(count)
+        steady = self._steady + noise * self.force.noise
+        still = STILL + noise * self.position.noise
+        for means, _ in self._blocks:
+            a, b, c, d, e = map(sub, last, means)
+            if max(abs(a), abs(b)) > still or max(abs(c), abs(d), abs(e)) > steady:
+                return
+        (first, some), (middle, more) = self._blocks[0], self._blocks[LAG]
+        x, y, fx, fy, _ = (a - b - b + c for a, b, c in zip(first, middle, last, strict=True))
+        samples = 6.0 / (1.0 / some + 4.0 / more + 1.0 / count)
+        self.position.add_blocks(x, y, samples)
+        self.force.add_blocks(fx, fy, samples)
+
+
+def _bent(values: Sequence[float], even: Sequence[bool]) -> float:
+    """Return the sum of the squared second differences of values at even times."""
+    bends = changes(changes(values))
+    return sum(compress(map(mul, bends, bends), even))

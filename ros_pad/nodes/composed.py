@@ -29,8 +29,7 @@ from rclpy.task import Future
 
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
-from ros_pad.estimation import SETTINGS, Tuning
-from ros_pad.estimation.tuning import attribute
+from ros_pad.estimation import Tuning
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
@@ -167,8 +166,7 @@ class ComposedTrial:
             own = body_settings_for(scene) | {'robot': scene.body.robot.source}
             # Its soles are on ankles.
             self.body_estimator = self._add(BodyEstimatorNode, foot_radius=0.0, **timed, **own)
-        own = {each.name: getattr(tuning, attribute(each)) for each in SETTINGS}
-        self.estimator = self._add(EstimatorNode, **own, **loaded)
+        self.estimator = self._add(EstimatorNode, **tuning.values, **loaded)
         own = ground if policy == 'oracle' else {}
         self.controller = self._add(
             ControllerNode,
@@ -383,7 +381,7 @@ def run(
     finally:
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
-    controller, shared = trial.walked, trial.estimator.stage.estimator.shared
+    controller, shared = trial.walked, trial.estimator.stage.model.shared
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()

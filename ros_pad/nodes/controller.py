@@ -22,7 +22,7 @@ from ros_pad.control.morphology import LIFT_OFF, MARGIN
 from ros_pad.control.policies import PREFIX, Policy
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
 from ros_pad.control.stage import DecisionStage
-from ros_pad.errors import ConfigError, InvalidInput, LimitError
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, SEED, Parameter
 from ros_pad.nodes.process import run
@@ -88,10 +88,10 @@ class ControllerNode(PadNode):
                 lift_off_share=values[LIFT_OFF.name],
                 command_timeout=values[COMMAND_TIMEOUT.name],
             )
-        except (InvalidInput, LimitError) as error:
+        except InvalidInput as error:
             names = 'parameters policy, scene and dome_pressure'
             raise ConfigError(f'node {self.get_name()}: {error} ({names})') from error
-        self.stage = DecisionStage(self.controller, self._legs, self._warn)
+        self.stage = DecisionStage(self.controller, self._legs)
         self._send = self.record_output(topics.COMMAND, self._legs)
         self.receive_record(topics.ESTIMATE, self._legs, self._on_estimate)
         self.receive_record(topics.PRESSURE, self._legs, self.stage.pressure)
@@ -123,11 +123,6 @@ class ControllerNode(PadNode):
             self.get_logger().warning(
                 f'leg {leg} stays flat: {refusal}', throttle_duration_sec=10.0
             )
-
-    def _warn(self, leg: int, error: InvalidInput) -> None:
-        self.get_logger().warning(
-            f'leg {leg}: estimate ignored: {error}', throttle_duration_sec=1.0
-        )
 
     def _tick(self, now_ns: int) -> None:
         """Observe legs without estimates, and publish diagnostics."""

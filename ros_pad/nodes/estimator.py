@@ -18,7 +18,6 @@ from ros_pad.errors import InvalidInput, PadError
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation import doubt as doubts
 from ros_pad.estimation.stage import PUBLISH_RATE, EstimationStage
-from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, Parameter
 from ros_pad.nodes.process import run
@@ -56,22 +55,19 @@ class EstimatorNode(PadNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('estimator', PARAMETERS, **kwargs)
         values, self._legs = self.values, self.values['legs']
-        tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
         self.stage = EstimationStage(
             values['foot'],
             values['expected_load'],
-            tuning,
+            Tuning.of(values),
             self._legs,
             round(1e9 / values['publish_rate']),
             self._warn,
         )
-        self._kept = learnt.settings_of(self.stage.estimator.shared)
+        self._kept = learnt.settings_of(self.stage.model.shared)
         self._send = self.record_output(topics.ESTIMATE, self._legs)
         self._keep_pace, self._health_pace = Pace(KEEP_PERIOD_NS), Pace(TICK_PERIOD_NS)
         self.receive_record(topics.SAMPLE, self._legs, self._on_samples)
-        self.receive_record(
-            topics.PRESSURE, self._legs, lambda block: self.stage.pressure(block.rows[-1])
-        )
+        self.receive_record(topics.PRESSURE, self._legs, self.stage.pressure)
         self.on_tick(self._idle)
 
     def _on_samples(self, block: Block) -> None:
@@ -97,7 +93,7 @@ class EstimatorNode(PadNode):
 
     def keep_learnt(self) -> None:
         """Write what feet have learnt of friction, if it is new and there is a file for it."""
-        path, settings = self.values['learnt'], learnt.settings_of(self.stage.estimator.shared)
+        path, settings = self.values['learnt'], learnt.settings_of(self.stage.model.shared)
         if not path or settings == self._kept:
             return
         try:
@@ -135,7 +131,7 @@ class EstimatorNode(PadNode):
 
     def _foot(self, index: int, row: Any, healthy: bool) -> DiagnosticStatus:
         """Return the health of the sensors of a foot, and its estimate, for ``/diagnostics``."""
-        leg, noise = self._legs[index], self.stage.estimator.tracks[index].watch.noise
+        leg, noise = self._legs[index], self.stage.tracks[index].watch
         values = {
             'P(wet)': f'{row["wetness"]:.3f}',
             'friction': f'{row["friction"]:.3f}',
@@ -151,7 +147,7 @@ class EstimatorNode(PadNode):
     def _learnt_status(self) -> DiagnosticStatus:
         """Return the scales of friction with their intervals, for ``/diagnostics``."""
         values = {}
-        for name, scale in self.stage.estimator.shared.scales.items():
+        for name, scale in self.stage.model.shared.scales.items():
             low, high = scale.interval
             values[name] = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
         text = 'friction over that of the contact model, with the interval of 95 %'

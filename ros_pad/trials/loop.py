@@ -285,7 +285,7 @@ class ClosedLoop:
             real_time_factor=real_time_factor,
         )
         trial.metrics = summarise(scene, trial, self.robot, self.controller)
-        trial.settings['learnt'] = settings_of(self.pipeline.estimation.estimator.shared)
+        trial.settings['learnt'] = settings_of(self.pipeline.estimation.model.shared)
         return trial
 
     def close(self) -> None:

@@ -17,10 +17,10 @@ from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphol
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
 from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.errors import BagError, ConfigError, InvalidInput, LimitError, reason
+from ros_pad.errors import BagError, ConfigError, InvalidInput, reason
 from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
-from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
+from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES
 from ros_pad.sensing.settings import SETTINGS as BODY_SETTINGS
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
@@ -208,10 +208,7 @@ class NodeSettings:
             )
             if of_policy := _of_policy(values):
                 policy_named(settings.policy, parameters=of_policy)  # raises unless it is adaptive
-            try:
-                settings.controller(settings.legs or (1,))
-            except LimitError as error:
-                raise InvalidInput(str(error)) from error
+            settings.controller(settings.legs or (1,))
         return settings
 
     def as_dict(self) -> dict[str, Any]:
@@ -222,7 +219,7 @@ class NodeSettings:
     @property
     def tuning(self) -> Tuning:
         """Tuning of the estimators; a yaw moment is used if its noise is above 0."""
-        return Tuning(**{attribute(each): self.values[each.name] for each in SETTINGS})
+        return Tuning.of(self.values)
 
     def controller(self, legs: Sequence[int]) -> MorphologyController:
         """Return a new controller.

@@ -23,6 +23,7 @@ from ros_pad.bags import BagReader
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.pace import TICK_PERIOD_NS, Pace, Progress, part
 from ros_pad.pipeline import Pipeline
 from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind
@@ -222,7 +223,7 @@ def replay(
         legs=legs,
         start_ns=bag.start,
         duration_s=(bag.end - bag.start) * 1e-9,
-        samples=dict(zip(legs, player.stages.estimation.used.tolist(), strict=True)),
+        samples=dict(zip(legs, player.stages.estimation.used, strict=True)),
         refused=player.refused,
         recorded=recorded,
         replayed=replayed,
@@ -245,7 +246,7 @@ def _changes(bag: BagReader) -> Iterator[str]:
 def _outcomes(
     samples: Stream, settings: NodeSettings, recorded: Tracks, replayed: Tracks
 ) -> Iterator[Outcome]:
-    gate = settings.values['load_gate'] * settings.values['expected_load']
+    gate = LOAD_GATE * settings.values['expected_load']
     delay_ns = round(2e9 / settings.values['publish_rate'])  # until a stance's estimate is there
     for place, leg in enumerate(samples.legs):
         load = samples.block.rows['force'][:, place, 2]
@@ -389,7 +390,7 @@ class _Player:
                 settings.foot, settings.values['expected_load'], settings.tuning, legs, period_ns,
                 self._reject,
             ),
-            DecisionStage(settings.controller(legs), legs, self._reject),
+            DecisionStage(settings.controller(legs), legs),
         )  # fmt: skip
         stamps, rows = streams[COMMAND.name].block
         self._setpoints = dict(zip(stamps.tolist(), rows['setpoint'], strict=True))  # recorded
@@ -421,7 +422,7 @@ class _Player:
     def _press(self, stamp_ns: int, rows: np.ndarray) -> None:
         """Process a pressure record."""
         self._tick(stamp_ns)
-        self.stages.estimation.pressure(rows)
+        self.stages.estimation.pressure(Block.of(stamp_ns, rows))
         own = rows.copy()
         own['pressure'][self._apart] = math.nan
         self.stages.decision.pressure(Block.of(stamp_ns, own))

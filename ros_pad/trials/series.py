@@ -153,4 +153,4 @@ def in_world(
 
 def _kind_of(code: float) -> int:
     """Return the place of a doubt in the list of kinds; -1 if it is not known."""
-    return -1 if math.isnan(code) else doubts.KINDS.index(doubts.kind(code))
+    return -1 if math.isnan(code) else doubts.DOUBTS.index(doubts.kind(code))

@@ -20,15 +20,21 @@ import inspect
 import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
+from unittest import mock
 
 from matplotlib.figure import Figure
 
-from ros_pad.control import MorphologyController, adaptive, first_morphologies, policy_named
-from ros_pad.control.footprints import Footprints
-from ros_pad.estimation import Tuning
-from ros_pad.estimation.friction import GroundModel
+from ros_pad.control import (
+    MorphologyController,
+    adaptive,
+    first_morphologies,
+    footprints,
+    policy_named,
+)
+from ros_pad.estimation import Tuning, alarm, friction, ground, track
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
@@ -45,6 +51,11 @@ CYCLES = 20
 SEEDS = (0, 1, 2, 3)
 FIXED = ('flat', 'dome')
 SHIPPED = 'as shipped'
+CONSTANTS = {
+    'LOAD_GATE': track, 'SMOOTHING': alarm, 'SPEED_NOISE': alarm, 'RATIO_NOISE': ground,
+    'TEMPER': friction, 'WET_PRIOR': footprints, 'FADING_LENGTH': footprints, 'KEPT': footprints,
+}  # fmt: skip
+"""Constants of estimator and controller that are made wrong, with the modules that hold them."""
 
 
 def defaults(function: Callable[..., Any], *names: str) -> dict[str, Any]:
@@ -62,7 +73,9 @@ class Setup:
     tuning: Tuning = field(default_factory=Tuning)
     limit_error: float = 1.0  # factor on the force limit of the simulated pads
     load_error: float = 1.0  # factor on the load that estimator and controller expect
-    ground: dict[str, Any] = field(default_factory=lambda: defaults(GroundModel, 'temper'))
+    constants: dict[str, float] = field(
+        default_factory=lambda: {name: getattr(module, name) for name, module in CONSTANTS.items()}
+    )
     controller: dict[str, Any] = field(
         default_factory=lambda: defaults(MorphologyController, 'margin', 'lift_off_share')
     )
@@ -70,9 +83,6 @@ class Setup:
         default_factory=lambda: defaults(
             adaptive, 'wet_above', 'dry_below', 'probe_below', 'dwell'
         )
-    )
-    footprints: dict[str, Any] = field(
-        default_factory=lambda: defaults(Footprints, 'wet_prior', 'fading_length', 'memory')
     )
     control_period: float = CONTROL_PERIOD_NS * 1e-9
 
@@ -116,10 +126,9 @@ ROBOT = 'robots/ch3r.yaml: '
 PATCHES = 'scenes/hexapod_patches.yaml: '
 MODEL = 'regulators/simulated.py: SimulatedRegulator.'
 TUNING = 'estimation/tuning.py: Tuning.'
-FILTER = 'estimation/friction.py: '
 CONTROL = 'control/morphology.py: MorphologyController.'
 POLICY = 'control/policies.py: adaptive.'
-PRINTS = 'control/footprints.py: Footprints.'
+PRINTS = 'control/footprints.py: '
 
 # fmt: off
 ASSUMPTIONS = (
@@ -170,15 +179,18 @@ ASSUMPTIONS = (
     Assumption(MODEL + 'dead_band', 'world.regulator.dead_band', 'regulator dead band', ''),
     Assumption(MODEL + 'quantum', 'world.regulator.quantum', 'regulator quantum', 'Pa'),
     Assumption('simulation/scene.py: Scene.expected_load', 'load_error', 'expected load', ''),
-    Assumption(TUNING + 'load_gate', 'tuning.load_gate', 'load gate, estimator', ''),
-    Assumption(TUNING + 'smoothing', 'tuning.smoothing', 'smoothing of speed', 's'),
+    Assumption('estimation/track.py: LOAD_GATE', 'constants.LOAD_GATE', 'load gate, estimator',
+               ''),
+    Assumption('estimation/alarm.py: SMOOTHING', 'constants.SMOOTHING', 'smoothing of speed', 's'),
     Assumption(TUNING + 'filter_period', 'tuning.filter_period', 'filter period', 's'),
     Assumption(TUNING + 'wet_prior', 'tuning.wet_prior', 'wet prior, estimator', '', 'odds'),
     Assumption(TUNING + 'patch_length', 'tuning.patch_length', 'patch length configured', 'm'),
-    Assumption(TUNING + 'ratio_noise', 'tuning.ratio_noise', 'model error of T/N', ''),
-    Assumption(TUNING + 'speed_noise', 'tuning.speed_noise', 'model error of slip speed', 'm/s'),
+    Assumption('estimation/ground.py: RATIO_NOISE',
+               'constants.RATIO_NOISE', 'model error of T/N', ''),
+    Assumption('estimation/alarm.py: SPEED_NOISE',
+               'constants.SPEED_NOISE', 'model error of slip speed', 'm/s'),
     Assumption(TUNING + 'turning_rate', 'tuning.turning_rate', 'turning rate of feet', 'rad/s'),
-    Assumption(FILTER + 'GroundModel.temper', 'ground.temper', 'temper', '', 'odds'),
+    Assumption('estimation/friction.py: TEMPER', 'constants.TEMPER', 'temper', '', 'odds'),
     Assumption(CONTROL + 'margin', 'controller.margin', 'pressure margin', '', 'excess'),
     Assumption(CONTROL + 'lift_off_share',
                'controller.lift_off_share', 'load gate, controller', ''),
@@ -186,9 +198,9 @@ ASSUMPTIONS = (
     Assumption(POLICY + 'dry_below', 'adaptive.dry_below', 'flat below', '', 'odds'),
     Assumption(POLICY + 'probe_below', 'adaptive.probe_below', 'probe below', '', 'odds'),
     Assumption(POLICY + 'dwell', 'adaptive.dwell', 'dwell', 'steps', 'whole'),
-    Assumption(PRINTS + 'wet_prior', 'footprints.wet_prior', 'wet prior, footprints', '', 'odds'),
-    Assumption(PRINTS + 'fading_length', 'footprints.fading_length', 'fading of footprints', 'm'),
-    Assumption(PRINTS + 'memory', 'footprints.memory', 'footprints kept', '', 'whole'),
+    Assumption(PRINTS + 'WET_PRIOR', 'constants.WET_PRIOR', 'wet prior, footprints', '', 'odds'),
+    Assumption(PRINTS + 'FADING_LENGTH', 'constants.FADING_LENGTH', 'fading of footprints', 'm'),
+    Assumption(PRINTS + 'KEPT', 'constants.KEPT', 'footprints kept', '', 'whole'),
     Assumption('pace.py: CONTROL_PERIOD_NS', 'control_period', 'control period', 's'),
 )
 # fmt: on
@@ -262,6 +274,13 @@ def wrong_by(setup: Setup, assumption: Assumption, factor: float) -> Setup:
 
 def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     """Return the distance a cycle, m, and the verdict, None if the walk is valid."""
+    with ExitStack() as changes:
+        for name, value in setup.constants.items():
+            changes.enter_context(mock.patch.object(CONSTANTS[name], name, value))
+        return _walk(setup, policy, seed)
+
+
+def _walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     world, configured = setup.world, setup.configured
     if setup.limit_error != 1.0:
         # The table of force limits is scaled in a copy of the foot that only the simulation uses.
@@ -278,8 +297,6 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     )
     period_ns = round(setup.control_period * 1e9)
     estimation = EstimationStage(configured.foot, load, tuning, configured.legs, period_ns)
-    # All feet have one model of the ground.
-    estimation.estimator.tracks[0].ground.filter.model.temper = setup.ground['temper']
     choose = policy_named(policy, loop.floor.wet)
     if policy == 'adaptive':
         choose = adaptive(**setup.adaptive)
@@ -292,7 +309,6 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         fixed_pressure=configured.dome_pressure,
         **setup.controller,
     )
-    controller.footprints = Footprints(**setup.footprints)
     loop.connect(controller, period_ns=period_ns)
     loop.pipeline = loop.pipeline._replace(estimation=estimation)
     loops.walk(loop)

@@ -27,9 +27,11 @@ from matplotlib.figure import Figure
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.alarm import SLOW_SLIP, SlipAlarm
+from ros_pad.estimation.alarm import SLOW_SLIP, SMOOTHING, SPEED_NOISE, SlipAlarm
 from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
+from ros_pad.estimation.ground import RATIO_NOISE
 from ros_pad.estimation.scales import FrictionPrior, FrictionScales
+from ros_pad.estimation.track import LOAD_GATE
 from studies import command
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
 from studies.samples import auc, runs
@@ -39,7 +41,7 @@ STABLE, NONE, SLIP = 0, 1, 2
 PERIOD = 0.01
 """Sampling period of the set, s."""
 
-GATE = Tuning().load_gate
+GATE = LOAD_GATE
 """Share of the expected load above which a foot is in stance, as for FootEstimator."""
 
 LABEL_RATE = 0.08
@@ -254,11 +256,11 @@ def features(recording: Recording) -> dict[str, np.ndarray]:
 def cusum(recording: Recording, speed: np.ndarray) -> np.ndarray:
     """Return the statistic of ros_pad's slip alarm for a speed, m/s.
 
-    The noise is the speed of the quiet foot with the default noise of Tuning. Nothing else is
+    The noise is the speed of the quiet foot with the model error of the estimator. Nothing else is
     fitted to the robot: the alarm tests for its default slip speed.
     """
-    noise = math.hypot(recording.usual(speed), Tuning().speed_noise)
-    alarm = SlipAlarm(Tuning().smoothing, (SLOW_SLIP,))
+    noise = math.hypot(recording.usual(speed), SPEED_NOISE)
+    alarm = SlipAlarm(SMOOTHING, (SLOW_SLIP,))
     statistic = np.zeros(len(speed))
     for start, stop in recording.stances:
         alarm.reset()
@@ -276,7 +278,7 @@ def least_friction(recording: Recording) -> np.ndarray:
     """
     prior = FrictionPrior.of(Foot.load('large37'), 6.8)
     ground = GroundFilter(GroundModel(FrictionScales(prior, learns=False)))
-    noise = Tuning().ratio_noise
+    noise = RATIO_NOISE
     window = round(Tuning().filter_period / PERIOD)
     quantile = np.zeros(len(recording.label))
     for start, stop in recording.stances:

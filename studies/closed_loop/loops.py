@@ -28,7 +28,7 @@ def estimated(stage: EstimationStage, records: Records) -> Block:
         if end > first:
             estimates += stage.process(Block(sample.stamps[first:end], sample.rows[first:end]))
         if rows is not None:
-            stage.pressure(rows)
+            stage.pressure(Block.of(0, rows))
     return Block.joined(ESTIMATE, estimates, sample.rows.shape[1])
 
 

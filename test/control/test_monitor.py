@@ -10,7 +10,7 @@ import pytest
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import PadMonitor
-from ros_pad.errors import InvalidInput, TransportError
+from ros_pad.errors import TransportError
 from ros_pad.regulators import SimulatedRegulator
 
 FOOT = Foot.load('large37')
@@ -218,9 +218,3 @@ def test_a_clock_that_jumps_accuses_nobody(jump):
     for k in range(30, 60):
         watch.update(jump + k * PERIOD, 70e3, 0.0)
     assert 'does not fill' in watch.reason
-
-
-@pytest.mark.parametrize('ceiling', [0.0, -1.0, math.nan])
-def test_a_bad_ceiling_is_named(ceiling):
-    with pytest.raises(InvalidInput, match='ceiling'):
-        PadMonitor(ceiling)

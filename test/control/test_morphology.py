@@ -16,10 +16,9 @@ from ros_pad.control import (
     adaptive,
     dome,
     first_morphologies,
-    flat,
     policy_named,
 )
-from ros_pad.errors import InvalidInput, LimitError, PadError
+from ros_pad.errors import InvalidInput
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -35,14 +34,6 @@ def lift_off(**changes):
 
 
 # --- policies ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize('wet_ahead', [0.0, 0.5, 1.0])
-@pytest.mark.parametrize('morphology', ['flat', 'dome'])
-def test_fixed_policies_are_fixed(wet_ahead, morphology):
-    step = lift_off(wet_ahead=wet_ahead, morphology=morphology)
-    assert flat(step) == Choice('flat')
-    assert dome(step) == Choice('dome')
 
 
 @pytest.mark.parametrize(
@@ -111,18 +102,6 @@ def test_first_morphologies():
 def test_bad_thresholds_are_named(bad):
     with pytest.raises(InvalidInput, match=next(iter(bad))):
         adaptive(**bad)
-
-
-def test_policies_by_name():
-    for name in POLICIES:
-        assert callable(policy_named(name, lambda x, y: True))
-    assert policy_named('flat') is flat
-    with pytest.raises(InvalidInput, match=r"'oracle' needs the map of the floor"):
-        policy_named('oracle')
-    with pytest.raises(
-        InvalidInput, match="policy = 'brave' is not allowed: one of flat, dome, adaptive, oracle"
-    ):
-        policy_named('brave')
 
 
 # --- the controller ------------------------------------------------------------------------------
@@ -214,7 +193,9 @@ def test_a_foot_too_heavy_for_domes_stays_flat_with_a_reason():
 
 
 def test_a_fixed_pressure_above_the_ceiling_is_refused_before_anything_moves():
-    with pytest.raises(LimitError, match=r'95000 Pa is above the ceiling of 90000 Pa of large37'):
+    with pytest.raises(
+        InvalidInput, match=r'fixed_pressure = 95000.0 .* to 90000 Pa, the ceiling of large37'
+    ):
         MorphologyController(FOOT, (1,), dome, LOAD, fixed_pressure=95e3)
 
 
@@ -281,23 +262,3 @@ def test_values_that_are_no_numbers_change_nothing(bad, place):
     assert controller.setpoint(1) == 0.0
     # The lift-off was not counted: the next valid sample is the lift-off.
     assert controller.update(1, 0.0, 0.5, (0.0, 0.0)) > 0.0
-
-
-@pytest.mark.parametrize(
-    ('name', 'value'),
-    [
-        ('expected_load', 0.0),
-        ('expected_load', math.nan),
-        ('start', 'round'),
-        ('margin', 0.0),
-        ('margin', math.inf),
-        ('fixed_pressure', 0.0),
-        ('fixed_pressure', -5.0),
-        ('lift_off_share', 0.0),
-        ('lift_off_share', 0.7),
-    ],
-)
-def test_bad_options_are_named(name, value):
-    options = {'expected_load': LOAD} | {name: value}
-    with pytest.raises(PadError, match=name):
-        MorphologyController(FOOT, (1,), dome, **options)

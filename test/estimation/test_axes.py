@@ -2,13 +2,14 @@
 """Turned and mirrored axes of force and position are found in a few stances; right ones never."""
 
 import math
-from dataclasses import astuple
 
 import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import SENSOR_FAULTS, FootEstimator
+from ros_pad.estimation import SENSOR_FAULTS, FootEstimator, doubt
+from ros_pad.estimation.axes import BLOCK, TURNS, Axes
+from ros_pad.estimation.scales import GRID
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -116,19 +117,18 @@ def test_right_axes_are_never_in_doubt(slip, ratio, bias):
 def test_what_was_learnt_is_forgotten_when_axes_turn():
     """A foot slips at T/N = 0.35, less than half of what the contact model expects if dry."""
     walk = Walk(slip=0.2, ratio=0.35)
-    prior = walk.estimator.ground.expected.medians
+    prior = walk.estimator.ground.expected.rows
     for step in range(20):
         walk._sample(np.zeros(3))
         walk._contact[0] += 0.14
         walk.step(0.2 + 0.7 * step)
-    assert walk.estimator.ground.expected.medians.flat_dry < 0.9 * prior.flat_dry
+    assert walk.estimator.ground.expected.rows[0] @ GRID < 0.9 * prior[0] @ GRID
     walk._axes = RIGHT, np.diag([1.0, 1.0, -1.0])
     for step in range(3):
         estimate = walk.step(0.7 * step)
     new = FootEstimator(FOOT, LOAD).estimate
     assert estimate.doubt.startswith('axes')
-    expected = walk.estimator.ground.expected.medians
-    assert astuple(expected) == pytest.approx(astuple(prior))
+    assert walk.estimator.ground.expected.rows == pytest.approx(prior)
     assert estimate.wet_probability == pytest.approx(new.wet_probability)
     assert estimate.friction_mean == pytest.approx(new.friction_mean, rel=1e-3)
 
@@ -146,3 +146,17 @@ def test_the_doubt_ends_when_the_axes_are_mended():
     assert 0.01 < estimate.friction_mean < 2.0 and 0.0 < estimate.wet_probability < 1.0
     scales = walk.estimator.ground.shared.scales
     assert all(math.isfinite(each.scale + each.sd) for each in scales.values())
+
+
+@pytest.mark.parametrize('turned', range(1, 8))
+def test_a_foot_that_sticks_shows_the_turn_by_its_shear(turned):
+    """Its position goes back by force over shear stiffness, in whatever direction it is pulled."""
+    axes, softness, time = Axes(LOAD, 1e-3), 1e-3, 0.0
+    for _ in range(8):
+        for step in range(20):
+            time += BLOCK
+            axes.update(BLOCK, 0.0, (0.0, 0.0, LOAD))
+            true = 2.0 * np.array([math.cos(0.7 * step), math.sin(1.1 * step)])
+            axes.compare(time, BLOCK, -softness * true, TURNS[turned] @ true, 1e-4)
+        axes.update(BLOCK, 0.0, (0.0, 0.0, 0.0))
+    assert axes.doubt[:2] == (doubt.TURNED, turned)

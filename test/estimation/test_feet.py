@@ -64,7 +64,7 @@ def estimates(stamps, rows, tuning=ALONE, block=1, period_ms=20, legs=None):
     )
     pressures = PRESSURE.rows(feet)
     pressures['pressure'] = 80e3 * (np.arange(feet) == 1)
-    stage.pressure(pressures)
+    stage.pressure(Block.of(0, pressures))
     found = []
     for begin in range(0, len(stamps), block):
         part = slice(begin, begin + block)

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator, Tuning
-from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.friction import GroundFilter, GroundModel
 from ros_pad.estimation.ground import LONGEST_GAP
+from ros_pad.estimation.scales import Scale
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -169,6 +170,8 @@ def test_friction_is_given_for_the_load_that_a_foot_stands_under():
         light = heavy.sample(0.3, share=0.5)
     assert light.friction_mean == pytest.approx(friction(2.0 * LOAD), abs=0.07)
     assert light.friction_mean - slid.friction_mean > 0.1
+    fifth = light.friction_mean - 1.64 * light.friction_sd  # percentile, at this load, too
+    assert light.margin + 0.3 == pytest.approx(fifth, abs=0.03)
     assert light.wet_probability < 0.1
 
 
@@ -208,6 +211,13 @@ def test_an_offset_of_1_newton_is_taken_off_in_the_air(offset):
     # If the foot is not lifted high enough, the offset stays.
     lame = Offset(offset, lift=0.005, swings=5).feel(125, pull, 0.0, slip=0.05)
     assert abs(lame.friction_mean - 0.12) > 0.01
+
+
+def test_what_is_known_of_friction_counts_from_the_start():
+    known = Tuning(scales={'flat_dry': Scale(0.5, 0.05)})
+    found = [GroundModel.of(FOOT, LOAD, each).shared.scales for each in (known, Tuning())]
+    assert found[0]['flat_dry'].scale == pytest.approx(0.5, rel=0.05)
+    assert found[0]['dome'] == found[1]['dome']
 
 
 def test_a_foot_that_lands_on_a_step_stands_there():

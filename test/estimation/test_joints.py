@@ -110,8 +110,8 @@ def test_the_link_above_soft_pads_moves_while_the_contact_sticks(shears, slips):
     [
         (None, 'motion = None'),
         (ContactMotion((math.nan, 0.0), 0.01), 'velocity x = nan m/s'),
-        (ContactMotion((0.0, 0.0), math.inf), 'deviation = inf m/s'),
-        (ContactMotion((0.0, 0.0), -0.01), 'deviation = -0.01 m/s'),
+        (ContactMotion((0.0, 0.0), math.inf), 'deviation .* = inf '),
+        (ContactMotion((0.0, 0.0), -0.01), 'deviation .* = -0.01 '),
     ],
 )
 def test_a_bad_motion_is_refused(motion, named):
@@ -144,9 +144,9 @@ def test_a_sample_needs_all_of_one_stamp(missing):
     send(stage, 4)
     send(stage, 8, **{missing: math.nan})
     send(stage, 12)
-    assert stage.samples == 2 and stage.used.tolist() == [2]
+    assert stage.samples == 2 and stage.used == [2]
     assert not rejected
-    assert stage.estimator.tracks[0].slip.sd == pytest.approx(math.hypot(0.01, 0.002))
+    assert stage.tracks[0].slip.sd == pytest.approx(math.hypot(0.01, 0.002))
 
 
 def test_an_infinite_variance_is_a_doubt():

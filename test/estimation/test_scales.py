@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
 from ros_pad.estimation.scales import CLASSES, GRID, Felt, FrictionPrior, FrictionScales, Scale
 
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
@@ -121,32 +120,12 @@ def test_the_order_in_which_feet_are_heard_does_not_matter():
     assert np.array_equal(first.expected(1e3).rows, second.expected(1e3).rows)
 
 
-def test_a_period_has_one_expectation_even_for_a_foot_that_is_late():
+def test_a_period_has_one_expectation():
     shared = shared_by(1)
     before = shared.expected(9.9).rows
     shared.add(felt(slip_at(0.4), slip_at(0.4), 9.2, wet=1e-6))
     assert np.array_equal(shared.expected(9.95).rows, before)
     after = shared.expected(10.01).rows
     assert not np.array_equal(after, before)
-    assert np.array_equal(shared.expected(9.99).rows, before)
     # After the clock was set back, nothing that was learnt is lost.
     assert np.array_equal(shared.expected(1.0).rows, after)
-
-
-def test_feet_learn_from_one_another():
-    """One foot slips at 0.5 on dry ground; another one, that has felt nothing, expects it."""
-    shared = FrictionScales(PRIOR)
-    feet = [GroundFilter(GroundModel(shared, wet_prior=0.1)) for _ in range(2)]
-    alone = GroundFilter(GroundModel(FrictionScales(PRIOR), wet_prior=0.1))
-    for step in range(12):
-        feet[0].touch_down(1.0, False, float(step))
-        for _ in range(8):
-            feet[0].update(Evidence(0.5, 0.03, 0.1, 0.003, 0.04))
-    for each in (feet[1], alone):
-        each.touch_down(0.0, False, 20.0)
-        each.touch_down(100.0, False, 21.0)  # far from all that it knew
-    dry = shared.scales['flat_dry']
-    assert dry.scale == pytest.approx(0.5 / 0.8, rel=0.1)
-    assert dry.sd < 0.15
-    assert feet[1].quantile(0.5) == pytest.approx(0.5, abs=0.05)
-    assert alone.quantile(0.5) > 0.65

@@ -174,7 +174,7 @@ def test_every_record_is_answered_by_one_of_its_moment(tmp_path):
         step = trial.simulator.robot.step
         trial.simulator.robot.step = lambda given: stepped.append(tuple(given)) or step(given)
         trial.walk()
-        assert trial.estimator.stage.used.tolist() == [len(stepped)] * 6
+        assert trial.estimator.stage.used == [len(stepped)] * 6
     found = records_of(tmp_path / 'bag')
     steps = round(scene.duration * 250)
     assert found['sample'].stamps.tolist() == [4 * MS * n for n in range(1, steps + 1)]

@@ -78,7 +78,7 @@ def test_a_driver_by_leg_walks_with_merge_and_views(context, executor, until):
     assert driver.commanded == dict.fromkeys(LEGS, fluid(0, 40e3).fluid_pressure)
     until(lambda: len(driver.wetness) == 2, what='estimates by leg')
     assert all(0.0 < each < 1.0 for each in driver.wetness.values())
-    assert estimator.stage.used.min() > 0
+    assert min(estimator.stage.used) > 0
     assert not merge.contested
     for node in nodes.values():
         assert not node.refused

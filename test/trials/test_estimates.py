@@ -8,6 +8,7 @@ import pytest
 
 from ros_pad.estimation import doubt
 from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
@@ -39,7 +40,7 @@ def walked(policy, seed, cycles=12):
     series = dict(zip(('load', 'speed', 'wet'), true, strict=True))
     series |= {'alarm': told.rows['slipping'], 'wetness': told.rows['wetness']}
     series |= {'pressure': loops.pressures(loop.log.records, told.stamps)}
-    series |= {'standing': loop.log.records.sample.rows['force'][..., 2] > tuning.load_gate * load}
+    series |= {'standing': loop.log.records.sample.rows['force'][..., 2] > LOAD_GATE * load}
     return {name: each[round(scene.settle / PERIOD) :] for name, each in series.items()}
 
 

@@ -9,7 +9,7 @@ from ros_pad.commands import run
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError, PadError
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.ground import shared_friction
+from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.scales import SCALE_RANGE, Scale
 from ros_pad.trials import learnt
 
@@ -34,7 +34,7 @@ def file(tmp_path):
 
 def test_a_file_gives_the_settings_of_an_estimator_on_the_next_floor(file):
     known = learnt.load(file(GOOD), 'large37')
-    tuning = Tuning(**{name.replace('.', '_'): value for name, value in known.items()})
+    tuning = Tuning.of(Tuning().values | known)
     assert tuning.scales == {
         'flat_dry': Scale(0.7, pytest.approx(math.hypot(0.1, 0.1))),
         'flat_wet': Scale(1.2, pytest.approx(math.hypot(0.2, 0.1))),
@@ -61,9 +61,9 @@ def test_all_policies_of_a_run_begin_with_it(file, tmp_path, monkeypatch):
     [(0.7, 0.1, 0.01, 0.02), (SCALE_RANGE[0], 0.1, 0.1, 0.5), (SCALE_RANGE[1], 0.01, 0.01, 0.01)],
 )
 def test_what_is_saved_is_what_is_known(tmp_path, scale, sd, scale_error, sd_error):
-    tuning = Tuning(scale_flat_dry=scale, scale_sd_flat_dry=sd, scale_sd_dome=1.0)
+    tuning = Tuning(scales={'flat_dry': Scale(scale, sd), 'dome': Scale(1.0, 1.0)})
     path = tmp_path / 'new.yaml'
-    learnt.save(path, learnt.settings_of(shared_friction(FOOT, 6.83, tuning)), FOOT)
+    learnt.save(path, learnt.settings_of(GroundModel.of(FOOT, 6.83, tuning).shared), FOOT)
     kept = yaml.safe_load(path.read_text())
     assert kept['flat_dry']['scale'] == pytest.approx(scale, rel=scale_error)
     assert kept['flat_dry']['sd'] == pytest.approx(sd, rel=sd_error)

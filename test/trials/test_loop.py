@@ -6,6 +6,7 @@ import pytest
 
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop as loop_module
 from ros_pad.trials import run
@@ -184,7 +185,7 @@ def watched(policy, seed, cycles=20):
     stage = EstimationStage(scene.foot, expected, tuning, scene.legs, loop.period_ns)
     stamps, told = loops.estimated(stage, loop.log.records)
     domed = loops.pressures(loop.log.records, stamps) > 1000.0
-    stands = loop.log.records.sample.rows['force'][..., 2] > tuning.load_gate * expected
+    stands = loop.log.records.sample.rows['force'][..., 2] > LOAD_GATE * expected
     # Before the robot walks the ground is unobservable.
     walks = (1e-9 * stamps > scene.settle + 0.3)[:, None]
     use = stands & walks & (load > 0.0)
@@ -204,7 +205,7 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
     neither scuff nor push one another.
     """
     loop = ClosedLoop(short(1), policy, 0, 'L1')
-    _, before = loop.pipeline.estimation.estimator.tracks[0].ground.filter.friction
+    _, before = loop.pipeline.estimation.tracks[0].ground.filter.friction
     walks = [watched(policy, seed) for seed in (0, 1, 2)]
     for rows, _ in walks:
         truth, mean, sd, *_ = rows.T

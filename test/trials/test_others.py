@@ -9,6 +9,7 @@ import signal
 import pytest
 
 from ros_pad import workers
+from ros_pad.estimation.scales import Scale
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop, others
 from ros_pad.trials.node_settings import tuning_for
@@ -44,7 +45,7 @@ def expected(tuning=None):
 def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, cores):
     """They have the tuning given: with another friction on wet ground feet find more of it."""
     tuning = tuning_for(SCENE, 'markers')
-    tuning = dataclasses.replace(tuning, scale_flat_wet=3.0, scale_sd_flat_wet=0.01)
+    tuning = dataclasses.replace(tuning, scales={'flat_wet': Scale(3.0, 0.01)})
     monkeypatch.setattr(workers, 'cores', lambda: cores)
     with others.beside(SCENE, POLICIES, 1, 'L1', 'markers', tuning) as metrics:
         found = metrics(shown)

@@ -7,7 +7,7 @@ import itertools
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from ros_pad import configuration
@@ -17,13 +17,12 @@ from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation import SETTINGS, Tuning
-from ros_pad.estimation.tuning import attribute
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.node_settings import Value, errors_naming, tuning_for
 from ros_pad.yaml_text import read_yaml
 
-_ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
+_ESTIMATOR = [each.name for each in SETTINGS]
 _POLICY = [each.name for each in POLICY_SETTINGS]
 
 Row: TypeAlias = 'dict[str, Any]'
@@ -165,8 +164,7 @@ class Sweep:
             of_scene = {n: v for n, v in values.items() if n not in of_policy | of_estimator}
             scene = scene_with(source, of_scene)
             with errors_naming(of_estimator):
-                changes: dict[str, Any] = {_ESTIMATOR[n]: v for n, v in of_estimator.items()}
-                tuning = replace(tuning_for(scene), **changes)
+                tuning = Tuning.of(tuning_for(scene).values | of_estimator)
             for policy in self.policies or (scene.policy,):
                 labels: dict[str, Any] = dict(values)
                 parameters: dict[str, Any] = {}

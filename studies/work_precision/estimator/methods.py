@@ -12,8 +12,9 @@ from typing import TypeAlias
 import numpy as np
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation.alarm import SlipAlarm
+from ros_pad.estimation.alarm import SMOOTHING, SPEED_NOISE, SlipAlarm
 from ros_pad.estimation.foot import FootEstimator, Tuning
+from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.pace import Progress
 from studies.work_precision.estimator.tally import (
     Row,
@@ -40,7 +41,7 @@ Update: TypeAlias = Callable[[float, Sequence[float], Sequence[float], float], b
 
 def ratio_alarm(settings: Settings, threshold: float) -> Update:
     """Return an alarm that is on if T/N is above a threshold."""
-    gate = settings[2].load_gate * settings[1]
+    gate = LOAD_GATE * settings[1]
 
     def update(
         time: float, force: Sequence[float], position: Sequence[float], pressure: float
@@ -55,9 +56,8 @@ class SlipSpeed:
     """The slip speed, computed as in the estimator."""
 
     def __init__(self, settings: Settings) -> None:
-        foot, load, tuning = settings
-        self._gate = tuning.load_gate * load
-        self._stiffness, self._smoothing = foot.shear_stiffness, tuning.smoothing
+        foot, load, _ = settings
+        self._gate, self._stiffness = LOAD_GATE * load, foot.shear_stiffness
         self._time: float | None = None
         self._x = self._y = 0.0
 
@@ -77,20 +77,20 @@ class SlipSpeed:
             self._time, self._x, self._y = time, x, y
             return None
         dt, self._time = time - self._time, time
-        share = dt / (self._smoothing + dt)
+        share = dt / (SMOOTHING + dt)
         self._x += share * (x - self._x)
         self._y += share * (y - self._y)
         along = (x - self._x) * push_x + (y - self._y) * push_y
-        return -along / (self._smoothing * (math.hypot(push_x, push_y) or math.inf)), dt
+        return -along / (SMOOTHING * (math.hypot(push_x, push_y) or math.inf)), dt
 
 
 def cusum_alarm(settings: Settings, speed: float, threshold: float) -> Update:
     """Return the test of :class:`SlipAlarm`, a CUSUM, on the slip speed."""
     foot, _, tuning = settings
     slip = SlipSpeed(settings)
-    alarm = SlipAlarm(tuning.smoothing, (speed,), threshold)
+    alarm = SlipAlarm(SMOOTHING, (speed,), threshold)
     noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
-    noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
+    noise = math.hypot(noise / SMOOTHING, SPEED_NOISE)
 
     def update(
         time: float, force: Sequence[float], position: Sequence[float], pressure: float

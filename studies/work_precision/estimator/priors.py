@@ -34,10 +34,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy import ndimage
 
-from ros_pad.estimation import FeetEstimator, FootEstimator
+from ros_pad.estimation import FootEstimator
 from ros_pad.estimation.friction import GroundFilter, GroundModel
-from ros_pad.estimation.ground import shared_friction
-from ros_pad.estimation.scales import SCALE_SD, SPREADS
+from ros_pad.estimation.scales import SCALE_SD, SPREADS, Scale
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.soles import Sole
@@ -166,7 +165,8 @@ def updates(walk: Recording, learns: bool) -> Iterator[tuple[float, int, int, in
     foot, load, tuning = walk.settings
     legs = range(walk.load.shape[1])
     tuning = replace(tuning, learn_friction=learns)
-    estimators = FootEstimator.of(FeetEstimator(len(legs), foot, load, tuning))
+    model = GroundModel.of(foot, load, tuning)
+    estimators = [FootEstimator(foot, load, tuning, model) for _ in legs]
     rows, stood, stances = walk.rows, [False] * len(legs), [0] * len(legs)
     for sample, time in enumerate(walk.stamps.tolist()):
         for leg in legs:
@@ -200,7 +200,7 @@ def measure(
 
 
 def _sample(ground_filter: Any, time: float, stance: int, ground: int, friction: float) -> Sample:
-    low, least, high, *middle = ground_filter.quantiles(SHARES)
+    low, least, high, *middle = ground_filter.quantile(SHARES)
     away = friction - np.array(middle)
     return Sample(
         time, stance, ground, abs(ground_filter.wet_probability - ground % 2),
@@ -212,13 +212,14 @@ def _sample(ground_filter: Any, time: float, stance: int, ground: int, friction:
 def _without_measurement(walk: Recording, condition: Condition) -> dict[str, list[GroundFilter]]:
     """Return, for each filter without measurement, its posterior in each class."""
     foot, load, tuning = walk.settings
-    sure: dict[str, Any] = {}
-    for name in ('flat_dry', 'flat_wet', 'dome'):
-        sure[f'scale_{name}'] = getattr(condition, name.removeprefix('flat_'))
-        sure[f'scale_sd_{name}'] = 0.01
+    sure = {
+        'flat_dry': Scale(condition.dry, 0.01),
+        'flat_wet': Scale(condition.wet, 0.01),
+        'dome': Scale(condition.dome, 0.01),
+    }
     found: dict[str, list[GroundFilter]] = {}
-    for name, change in ((PRIOR, {}), (LABEL, {}), (KNOWN, sure)):
-        shared = shared_friction(foot, load, replace(tuning, **change))
+    for name, scales in ((PRIOR, tuning.scales), (LABEL, tuning.scales), (KNOWN, sure)):
+        shared = GroundModel.of(foot, load, replace(tuning, scales=scales)).shared
         found[name] = []
         for ground in range(4):
             wet = Tuning.wet_prior if name == PRIOR else (1e-9, 1.0 - 1e-9)[ground % 2]

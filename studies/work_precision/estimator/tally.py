@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import FeetEstimator, FootEstimator
+from ros_pad.estimation import FootEstimator
+from ros_pad.estimation.friction import GroundModel
 from studies.samples import bootstrap
 from studies.work_precision.estimator.walks import LOADED, SETTLED, Flags, Floats, Recording
 
@@ -61,7 +62,8 @@ class Estimates:
 def replay(walk: Recording) -> Estimates:
     """Return the results for the readings of a robot, whose feet learn together."""
     legs = walk.load.shape[1]
-    estimators = FootEstimator.of(FeetEstimator(legs, *walk.settings))
+    model = GroundModel.of(*walk.settings)
+    estimators = [FootEstimator(*walk.settings, model) for _ in range(legs)]
     out = np.empty((*walk.load.shape, 7))
     rows = walk.rows
     for sample, (stamp, arrived) in enumerate(

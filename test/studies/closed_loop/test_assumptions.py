@@ -34,7 +34,6 @@ TUNED = {
     'estimation/tuning.py': ('Tuning',),
     'estimation/alarm.py': ('SlipAlarm',),
     'estimation/friction.py': ('GroundModel',),
-    'control/footprints.py': ('Footprints',),
     'control/morphology.py': ('MorphologyController',),
     'control/policies.py': ('adaptive',),
     'regulators/simulated.py': ('SimulatedRegulator',),
