@@ -7,6 +7,7 @@ numbers differ: rclpy takes several times as long to convert whole messages.
 
 from __future__ import annotations
 
+import json
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -17,12 +18,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import String
 
 from ros_pad.bags import topics
 from ros_pad.bags.codec import field_getter, message_type, put_field
 from ros_pad.bags.topics import Topic
 from ros_pad.bags.wire import Wire
-from ros_pad.nodes.parameters import Parameter, declare
+from ros_pad.nodes.parameters import Parameter, declare, values_of
 from ros_pad.nodes.qos import message_class, publisher, subscription
 from ros_pad.pace import LATE, TICK_PERIOD_NS, Pace
 from ros_pad.records import Block, split
@@ -68,6 +70,9 @@ class PadNode(Node):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self.prepare()
         self.values = declare(self, parameters, self.permit, self.apply)
+        self._send_parameters = self.output(topics.PARAMETERS)
+        self._publish_parameters()
+        self.add_post_set_parameters_callback(self._publish_parameters)
         handle = self.get_clock().handle
         self.now_ns: Callable[[], int] = lambda: int(handle.get_now().nanoseconds)
         self.simulated: bool = self.get_parameter('use_sim_time').value
@@ -75,6 +80,7 @@ class PadNode(Node):
         self.reported: Any = None
         self._reason, self._quiet_until = '', 0.0  # of the last refusal
         self._record_ns = 0  # stamp of the last record that was processed
+        self._tick: Callable[[int], object] = lambda now_ns: None
         self._pace, self._since_ns, self._counted = Pace(1_000_000_000), self.now_ns(), 0
         self._send_health = self.output(topics.DIAGNOSTICS)
 
@@ -86,6 +92,11 @@ class PadNode(Node):
 
     def apply(self, values: Mapping[str, Any]) -> None:
         """Live by changed parameters, which nobody has refused."""
+
+    def _publish_parameters(self, changes: Sequence[object] = ()) -> None:
+        """Tell recorders the values of all parameters; who comes later hears of them, too."""
+        values = {self.get_fully_qualified_name(): values_of(self)}
+        self._send_parameters(String(data=json.dumps(values)))
 
     # --- messages ------------------------------------------------------------------------------
 
@@ -191,33 +202,35 @@ class PadNode(Node):
 
     def on_tick(
         self,
-        callback: Callable[[int], None],
+        callback: Callable[[int], object],
         period: float = TICK_PERIOD_NS * 1e-9,
         all_steps: bool = False,
     ) -> None:
         """Call a function again and again with the node's time, ns.
 
         In real time a timer calls it every ``period`` seconds. In simulated time nodes live by the
-        stamps of records, see :meth:`advance`, and ``/clock`` calls it where no records come, or
-        at all steps.
+        stamps of records, see :meth:`advance`, and ``/clock`` calls it where no records come, once
+        in 0.1 s, or at all steps.
         """
+        pace = Pace(TICK_PERIOD_NS)
+        self._tick = lambda now_ns: callback(now_ns) if all_steps or pace.due(now_ns) else None
         if not self.simulated:
-            self.every(period, lambda: callback(self.now_ns()))
+            self.every(period, lambda: self._tick(self.now_ns()))
             return
 
         def on_clock(seconds: int, fraction: int) -> None:
             now_ns = seconds * 1_000_000_000 + fraction
             # Which of a record and the clock of its moment comes first must mean nothing.
             if all_steps or abs(now_ns - self._record_ns) > TICK_PERIOD_NS:
-                callback(now_ns)
+                self._tick(now_ns)
 
         self.receive(topics.CLOCK, on_clock, topics.CLOCK.values)
 
-    def advance(self, stamp_ns: int, tick: Callable[[int], None]) -> None:
+    def advance(self, stamp_ns: int) -> None:
         """Process the stamp of a record, ns, which is a tick in simulated time."""
         if self.simulated:
             self._record_ns = stamp_ns
-            tick(stamp_ns)
+            self._tick(stamp_ns)
 
     # --- health --------------------------------------------------------------------------------
 

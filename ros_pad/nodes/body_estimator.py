@@ -26,7 +26,7 @@ from ros_pad.nodes.base import PadNode, set_stamp
 from ros_pad.nodes.parameters import LEGS, Parameter
 from ros_pad.nodes.process import run
 from ros_pad.nodes.qos import message_class
-from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace
+from ros_pad.pace import CONTROL_PERIOD_NS, Pace
 from ros_pad.records import SAMPLE, Block, split
 from ros_pad.sensing import BodyEstimate, SensingStage
 from ros_pad.sensing.mapping import Mapping
@@ -158,8 +158,7 @@ class BodyEstimatorNode(PadNode):
             self.receive_record(topics.FORCE, legs, self._on_forces)
             self.receive(topics.IMU, self._on_imu, (*STAMP, *_ABSENT, *topics.IMU.values))
             self.receive(topics.JOINT_STATES, self._on_joints)
-        self._health_pace = Pace(TICK_PERIOD_NS)
-        self.on_tick(self._tick)
+        self.on_tick(self._look)
 
     def _advertise(self, base: str, publish_tf: bool) -> None:
         """Create the publishers of odom and of the transform from odom to the base."""
@@ -202,7 +201,7 @@ class BodyEstimatorNode(PadNode):
             self.create_subscription(kind, source.topic, callback, qos.SENSOR)
 
     def _on_forces(self, block: Block) -> None:
-        self.advance(block.last_ns, self._tick)
+        self.advance(block.last_ns)
         for stamp_ns, rows in zip(block.stamps.tolist(), block.rows['force'], strict=True):
             for index, force in enumerate(rows):
                 if np.isfinite(force).all():
@@ -252,9 +251,8 @@ class BodyEstimatorNode(PadNode):
     def _warn(self, error: InvalidInput) -> None:
         self.get_logger().warning(f'reading ignored: {error}', throttle_duration_sec=1.0)
 
-    def _tick(self, now_ns: int) -> None:
-        if not self._health_pace.due(now_ns):
-            return
+    def _look(self, now_ns: int) -> None:
+        """Look for silent sensors, and report on the motion."""
         stage = self.stage
         stage.tick(now_ns)
         if not self.due(now_ns, (stage.doubt or '').partition(':')[0]):

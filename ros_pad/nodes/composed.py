@@ -12,7 +12,6 @@ from __future__ import annotations
 import copy
 import gc
 import itertools
-import json
 import os
 import time
 from collections.abc import Callable
@@ -35,7 +34,7 @@ from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
-from ros_pad.nodes.parameters import BACKEND_OPTIONS, values_of
+from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
@@ -44,7 +43,7 @@ from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.label import PARAMETERS, label
+from ros_pad.trials.label import label
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.metrics import summarise
 from ros_pad.trials.node_settings import body_settings_for, tuning_for
@@ -116,8 +115,6 @@ class ComposedTrial:
         try:
             tuning = tuning or tuning_for(scene, sensing)
             self._add_nodes(policy, seed, bag, fidelity, sensing, tuning)
-            parameters = {each.get_fully_qualified_name(): values_of(each) for each in self._nodes}
-            self.recorder.describe({PARAMETERS: json.dumps(parameters)})
             # The executor adds nodes only while it spins; messages that were published before
             # that would arrive in another order.
             self.executor.spin_once(timeout_sec=0.01)

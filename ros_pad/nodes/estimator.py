@@ -15,16 +15,16 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from ros_pad.bags import topics
 from ros_pad.errors import InvalidInput, PadError
-from ros_pad.estimation import SETTINGS, Tuning
+from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import doubt as doubts
 from ros_pad.estimation.stage import PUBLISH_RATE, EstimationStage
-from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, Parameter
 from ros_pad.nodes.process import run
-from ros_pad.pace import TICK_PERIOD_NS, Pace
+from ros_pad.pace import Pace
 from ros_pad.records import Block
 from ros_pad.trials import learnt
+from ros_pad.trials.node_settings import NodeSettings
 
 PARAMETERS = (
     LEGS,
@@ -56,26 +56,25 @@ class EstimatorNode(PadNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('estimator', PARAMETERS, **kwargs)
         values, self._legs = self.values, self.values['legs']
-        tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
         self.stage = EstimationStage(
             values['foot'],
             values['expected_load'],
-            tuning,
+            NodeSettings(values['foot'], '', values).tuning,
             self._legs,
             round(1e9 / values['publish_rate']),
             self._warn,
         )
         self._kept = learnt.settings_of(self.stage.estimator.shared)
         self._send = self.record_output(topics.ESTIMATE, self._legs)
-        self._keep_pace, self._health_pace = Pace(KEEP_PERIOD_NS), Pace(TICK_PERIOD_NS)
+        self._keep_pace = Pace(KEEP_PERIOD_NS)
         self.receive_record(topics.SAMPLE, self._legs, self._on_samples)
         self.receive_record(
             topics.PRESSURE, self._legs, lambda block: self.stage.pressure(block.rows[-1])
         )
-        self.on_tick(self._idle)
+        self.on_tick(self._look)
 
     def _on_samples(self, block: Block) -> None:
-        self.advance(block.last_ns, self._tick)
+        self.advance(block.last_ns)
         for estimate in self.stage.process(block):
             self._send(estimate)
 
@@ -112,24 +111,18 @@ class EstimatorNode(PadNode):
             self.keep_learnt()
         super().destroy_node()
 
-    def _idle(self, now_ns: int) -> None:
-        """Tick without samples: the controller has to know of a foot whose sensors are silent."""
-        before = self.reported
-        self._tick(now_ns)
-        if self.reported != before:
-            self._send(self.stage.estimate(now_ns))
-
-    def _tick(self, now_ns: int) -> None:
-        if not self._health_pace.due(now_ns):
-            return
+    def _look(self, now_ns: int) -> None:
+        """Look for silent sensors, and report on all of them."""
         self.stage.tick(now_ns)
         if self._keep_pace.due(now_ns):
             self.keep_learnt()
-        rows = self.stage.estimate(now_ns).rows[0]
+        estimate = self.stage.estimate(now_ns)
+        rows = estimate.rows[0]
         healthy = [not doubts.is_fault(code) for code in rows['doubt'].tolist()]
+        if healthy != self.reported and now_ns != self._record_ns:
+            self._send(estimate)  # no sample says it, and the controller has to know
         if self.due(now_ns, healthy):
-            numbers = range(len(rows))
-            feet = [self._foot(*each) for each in zip(numbers, rows, healthy, strict=True)]
+            feet = map(self._foot, range(len(rows)), rows, healthy)
             rate = self.rate(now_ns, self.stage.samples, self.stage.last_ns)
             self.report(now_ns, [*feet, self._learnt_status(), *rate])
 

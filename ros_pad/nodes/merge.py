@@ -77,7 +77,7 @@ class MergeNode(PadNode):
             for leg in legs:
                 take = partial(self._take, joined, topic, leg)
                 self.receive(topic, take, (FRAME, *STAMP, *topic.values), leg)
-        self.on_tick(self._tick, WAIT_NS * 1e-9, all_steps=True)
+        self.on_tick(self._on_time, WAIT_NS * 1e-9, all_steps=True)
 
     def _take(
         self,
@@ -114,7 +114,7 @@ class MergeNode(PadNode):
                 self._outputs[topic] = self.record_output(topic, self.values['legs'])
             self._outputs[topic](block)
 
-    def _tick(self, now_ns: int) -> None:
+    def _on_time(self, now_ns: int) -> None:
         for topic, joiner in self._joiners.items():
             self._send(topic, joiner.expire(now_ns))
         if self.due(now_ns) and (self.contested or self.refused):

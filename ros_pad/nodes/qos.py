@@ -38,6 +38,11 @@ STATE = QoSProfile(
 )  # fmt: skip
 """Latched state such as the morphology: a late subscriber receives the last one."""
 
+STATES = QoSProfile(
+    depth=100, reliability=_RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)  # fmt: skip
+"""Subscribe to the latched states of several publishers."""
+
 CLOCK = QoSProfile(depth=1, reliability=_BEST_EFFORT)
 """Subscribe to ``/clock``, as rclpy itself does."""
 
@@ -58,15 +63,14 @@ _OF = {
     topics.LEG_SETPOINT.pattern: Profiles(NEWEST, NEWEST),
     topics.CLOCK.pattern: Profiles(NEWEST, CLOCK),
     topics.DIAGNOSTICS.pattern: Profiles(RELIABLE, RELIABLE),
+    topics.PARAMETERS.pattern: Profiles(STATE, STATES),
 }
 
 
 def profiles(topic: Topic) -> Profiles:
     """Return the QoS of a topic."""
-    if topic.text:
-        return Profiles(STATE, STATE)
-    measured = Profiles(RELIABLE, RECORDS if topic in topics.RECORDS else SENSOR)
-    return _OF.get(topic.pattern, measured)
+    usual = Profiles(RELIABLE, RECORDS if topic in topics.RECORDS else SENSOR)
+    return _OF.get(topic.pattern, Profiles(STATE, STATE) if topic.text else usual)
 
 
 def publisher(node: Node, topic: Topic, leg: int | None = None) -> Publisher:

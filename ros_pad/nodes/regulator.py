@@ -106,7 +106,9 @@ class RegulatorNode(PadNode, LifecycleNode):
         self.receive_record(topics.COMMAND, legs, self._on_command)
         self.create_service(Trigger, '~/vent', self._on_vent)
         self.add_on_set_parameters_callback(self._check_options)
-        self.on_tick(self._tick, min(LONGEST_TICK, 0.5 / values['publish_rate']), all_steps=True)
+        self.on_tick(
+            self._on_time, min(LONGEST_TICK, 0.5 / values['publish_rate']), all_steps=True
+        )
         self._starting: bool = values['autostart']
         if self._starting:
             self.trigger_configure()
@@ -277,7 +279,7 @@ class RegulatorNode(PadNode, LifecycleNode):
         """Return whether a record was ahead of a simulated time, ns, which does not go back."""
         return self.simulated and 0 <= self.tick_ns - clock_ns <= TICK_PERIOD_NS
 
-    def _tick(self, now_ns: int) -> None:
+    def _on_time(self, now_ns: int) -> None:
         if self.active and self._ahead_of(now_ns):
             return
         self._supervise(now_ns)
