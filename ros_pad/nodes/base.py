@@ -196,7 +196,7 @@ class PadNode(Node):
 
     # --- time ----------------------------------------------------------------------------------
 
-    def every(self, period: float, callback: Callable[[], None]) -> None:
+    def every(self, period: float, callback: Callable[[], object]) -> None:
         """Call a function every so many seconds of a clock that no change of the time stops."""
         self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 

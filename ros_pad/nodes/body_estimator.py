@@ -8,7 +8,6 @@ why the motion must not be relied on is published on ``body/doubt`` and on ``/di
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -24,7 +23,6 @@ from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.nodes import qos
 from ros_pad.nodes.base import PadNode, set_stamp
 from ros_pad.nodes.parameters import LEGS, Parameter
-from ros_pad.nodes.process import run
 from ros_pad.nodes.qos import message_class
 from ros_pad.pace import CONTROL_PERIOD_NS, Pace
 from ros_pad.records import SAMPLE, Block, split
@@ -267,7 +265,3 @@ class BodyEstimatorNode(PadNode):
         }
         status = self.status('sensing', level, text, values, self._robot.name)
         self.report(now_ns, [status, *self.rate(now_ns, stage.samples, stage.last_ns)])
-
-
-if __name__ == '__main__':
-    sys.exit(run(BodyEstimatorNode))

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,7 +17,6 @@ from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import ConfigError, InvalidInput, LimitError
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, SEED, Parameter
-from ros_pad.nodes.process import run
 from ros_pad.records import Block
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.node_settings import NodeSettings
@@ -131,7 +129,3 @@ class ControllerNode(PadNode):
             'flat feet pay': controller.friction.flat_pays,
         }
         return self.status(f'leg {leg} pad', level, text, values, f'leg {leg}')
-
-
-if __name__ == '__main__':
-    sys.exit(run(ControllerNode))

@@ -8,7 +8,6 @@ as text, with the health of the sensors.
 from __future__ import annotations
 
 import os
-import sys
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -20,7 +19,6 @@ from ros_pad.estimation import doubt as doubts
 from ros_pad.estimation.stage import PUBLISH_RATE, EstimationStage
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, Parameter
-from ros_pad.nodes.process import run
 from ros_pad.pace import Pace
 from ros_pad.records import Block
 from ros_pad.trials import learnt
@@ -149,7 +147,3 @@ class EstimatorNode(PadNode):
             values[name] = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
         text = 'friction over that of the contact model, with the interval of 95 %'
         return self.status('friction of the floor', self.OK, text, values, 'feet')
-
-
-if __name__ == '__main__':
-    sys.exit(run(EstimatorNode))

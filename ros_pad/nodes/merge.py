@@ -9,7 +9,6 @@ record that somebody else publishes is not published here: two sources would con
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -24,7 +23,6 @@ from ros_pad.estimation.tuning import SOURCES
 from ros_pad.joining import WAIT_NS, Joiner
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
-from ros_pad.nodes.process import run
 from ros_pad.records import Block
 
 PARAMETERS = (
@@ -121,7 +119,3 @@ class MergeNode(PadNode):
             text = 'others publish records too: those of this node are refused'
             statuses = [self.status('records', self.ERROR, text, self.contested)]
             self.report(now_ns, statuses if self.contested else [])
-
-
-if __name__ == '__main__':
-    sys.exit(run(MergeNode))

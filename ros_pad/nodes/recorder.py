@@ -6,7 +6,6 @@ from __future__ import annotations
 import datetime
 import json
 import struct
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -23,7 +22,6 @@ from ros_pad.nodes import qos
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.intake import Intake
 from ros_pad.nodes.parameters import LEGS, Parameter
-from ros_pad.nodes.process import run
 from ros_pad.pace import LATE
 from ros_pad.trials import label
 
@@ -229,7 +227,3 @@ def _stamp_of(data: bytes) -> int:
     except (IndexError, struct.error):
         return 0
     return int(seconds * 1_000_000_000 + rest)
-
-
-if __name__ == '__main__':
-    sys.exit(run(RecorderNode))

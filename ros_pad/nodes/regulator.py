@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import fields
@@ -21,7 +20,6 @@ from ros_pad.errors import ConfigError
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import BACKEND_OPTIONS, FOOT, LEGS, Parameter, plain
-from ros_pad.nodes.process import run
 from ros_pad.pace import TICK_PERIOD_NS, Pace
 from ros_pad.records import Block
 from ros_pad.regulators import BACKENDS, create
@@ -326,7 +324,3 @@ class RegulatorNode(PadNode, LifecycleNode):
 def _settings(values: Mapping[str, Any]) -> SupervisorSettings:
     names = [each.name for each in fields(SupervisorSettings)]
     return SupervisorSettings(**{name: values[name] for name in names})
-
-
-if __name__ == '__main__':
-    sys.exit(run(RegulatorNode))

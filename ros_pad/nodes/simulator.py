@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,9 +17,8 @@ from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes.base import PadNode
-from ros_pad.nodes.markers import ARRAY, WalkMarkers
+from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.parameters import SCENE, SEED, Parameter
-from ros_pad.nodes.process import run
 from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, RealTime
 from ros_pad.records import SAMPLE, Block, split
 from ros_pad.simulation import fidelity
@@ -247,8 +245,8 @@ class SimulatorNode(PadNode):
         if self.robot.joint_names and not self._body_sensors:
             self._outputs['joints'](*split(self._last_ns), self.robot.joint_positions)
         if self._markers_pace.due(self._last_ns):
-            array = self._markers.message(self.robot, self.pressures, self._last_ns)
-            self._outputs['markers'](ARRAY.encode(array))
+            markers = self._markers.message(self.robot, self.pressures, self._last_ns)
+            self._outputs['markers'](markers)
         return count
 
     def _sense(
@@ -269,7 +267,3 @@ class SimulatorNode(PadNode):
         if self.values['publish_clock']:
             self._last_ns = self.time_ns
             self._outputs['clock'](*split(self.time_ns))
-
-
-if __name__ == '__main__':
-    sys.exit(run(SimulatorNode))

@@ -9,7 +9,6 @@ others, and markers of the feet coloured by their probability of wet ground.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -21,10 +20,9 @@ from ros_pad.bags import topics
 from ros_pad.bags.topics import STAMP, Topic
 from ros_pad.control.policies import DOME, FLAT
 from ros_pad.estimation import doubt as doubts
-from ros_pad.nodes.base import PadNode, set_stamp
-from ros_pad.nodes.markers import ARRAY, marker_of_foot
+from ros_pad.nodes.base import PadNode
+from ros_pad.nodes.markers import array_of, marker_of_foot
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
-from ros_pad.nodes.process import run
 from ros_pad.pace import Pace
 from ros_pad.records import Block, split
 
@@ -117,16 +115,11 @@ class ViewsNode(PadNode):
             return
         if self.refused and self.due(block.last_ns):
             self.report(block.last_ns, [])
-        array = ARRAY.blank()
-        for leg, place, wetness in zip(
-            self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True
-        ):
-            if math.isfinite(sum(place)):
-                marker = marker_of_foot(leg, place[0], place[1], wetness)
-                marker.header.frame_id = self.values['frame']
-                set_stamp(marker.header.stamp, block.last_ns)
-                array.markers.append(marker)
-        self._send_markers(ARRAY.encode(array))
+        feet = zip(self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True)
+        markers = [
+            marker_of_foot(leg, at, wet) for leg, at, wet in feet if math.isfinite(sum(at))
+        ]
+        self._send_markers(array_of(markers, block.last_ns, self.values['frame']))
 
 
 def _doubt(row: Any) -> str | None:
@@ -137,7 +130,3 @@ def _doubt(row: Any) -> str | None:
 def _morphology(row: Any) -> str | None:
     """Return the morphology in a command; None where it is missing."""
     return None if math.isnan(row['dome']) else DOME if row['dome'] == 1.0 else FLAT
-
-
-if __name__ == '__main__':
-    sys.exit(run(ViewsNode))

@@ -49,6 +49,7 @@ WARM_UP = 8.0  # s, until all nodes have found one another
 _HERE = pathlib.Path(__file__).resolve().parents[2]
 
 # Runs in either checkout.
+_START = 'from ros_pad.nodes.start import {0}; {0}()'  # in older checkouts, too
 _RATE = """
 import sys
 from ros_pad.bags import BagReader
@@ -137,7 +138,7 @@ def _live(
     own = {'recorder': f'folder:={bag}', 'simulator': f'rate:={rate}'}
     commands = {
         node: [
-            *(_python(checkout), '-m', f'ros_pad.nodes.{node}', '--ros-args'),
+            *(_python(checkout), '-c', _START.format(node), '--ros-args'),
             *('--params-file', os.fspath(checkout / 'config' / 'params.yaml')),
             *(('-p', own[node]) if node in own else ()),
         ]

@@ -114,12 +114,10 @@ def script(name: str) -> str:
     return str(pathlib.Path(sys.executable).parent / name)
 
 
-def words_of(name: str, number: int, *parameters: str) -> list[str]:
-    """Return the command of a node, by turns its console script and ``python -m``."""
-    start = [script(f'{name}_node')]
-    if number % 2:
-        start = [sys.executable, '-m', f'ros_pad.nodes.{name}']
-    return [*start, '--ros-args', *(word for each in parameters for word in ('-p', each))]
+def words_of(name: str, *parameters: str) -> list[str]:
+    """Return the command of a node."""
+    given = [word for each in parameters for word in ('-p', each)]
+    return [script(f'{name}_node'), '--ros-args', *given]
 
 
 def _handles_signals(child: subprocess.Popen[bytes]) -> bool:
@@ -181,7 +179,7 @@ def perform(
         for child in children:
             child.send_signal(one.pair[1])
         for words, child in zip(commands, children, strict=True):
-            name = words[2] if words[1:2] == ['-m'] else words[0]
+            name = words[0]
             try:
                 status = child.wait(max(0.1, sent + PATIENCE - time.monotonic()))
             except subprocess.TimeoutExpired:
@@ -248,7 +246,7 @@ def check_bag(one: Try, bag: pathlib.Path) -> None:
         ]
 
 
-def _regulator(one: Try, number: int, folder: pathlib.Path) -> None:
+def _regulator(one: Try, folder: pathlib.Path) -> None:
     ids = 'ABCDEF'
     device = AlicatEmulator(ids)
 
@@ -261,35 +259,35 @@ def _regulator(one: Try, number: int, folder: pathlib.Path) -> None:
             f'backend_options.port:={line.path}',
             f'backend_options.unit_id:=[{",".join(ids)}]',
         )
-        perform(one, [words_of('regulator', number, *parameters)], folder, filled)
+        perform(one, [words_of('regulator', *parameters)], folder, filled)
         if filled():
             one.problems.append('a device was not vented')
 
 
-def _recorder(one: Try, number: int, folder: pathlib.Path) -> None:
-    perform(one, [words_of('recorder', number, 'folder:=bag')], folder)
+def _recorder(one: Try, folder: pathlib.Path) -> None:
+    perform(one, [words_of('recorder', 'folder:=bag')], folder)
     check_bag(one, folder / 'bag')
 
 
-def _pad(one: Try, number: int, folder: pathlib.Path) -> None:
+def _pad(one: Try, folder: pathlib.Path) -> None:
     perform(one, [[script('pad'), *_WALK, '--out', 'out']], folder)
     check_bag(one, folder / 'out' / 'bag')
 
 
-def _group(one: Try, number: int, folder: pathlib.Path) -> None:
+def _group(one: Try, folder: pathlib.Path) -> None:
     own = {'recorder': ('folder:=bag',)}
-    perform(one, [words_of(name, number, *own.get(name, ())) for name in NODES], folder)
+    perform(one, [words_of(name, *own.get(name, ())) for name in NODES], folder)
     check_bag(one, folder / 'bag')
 
 
-def _launch(one: Try, number: int, folder: pathlib.Path) -> None:
+def _launch(one: Try, folder: pathlib.Path) -> None:
     file = command.ROOT / 'launch' / 'ros_pad.launch.py'
     perform(one, [['ros2', 'launch', str(file), 'folder:=bag']], folder)
     check_bag(one, folder / 'bag')
 
 
-def _node(one: Try, number: int, folder: pathlib.Path) -> None:
-    perform(one, [words_of(one.target, number)], folder)
+def _node(one: Try, folder: pathlib.Path) -> None:
+    perform(one, [words_of(one.target)], folder)
 
 
 _RUN = {
@@ -330,7 +328,7 @@ def run(target: str, repeats: int, work: float, seed: int = 0) -> Iterator[Try]:
         gap = math.exp(moments.uniform(math.log(SHORTEST), math.log(LONGEST)))
         one = Try(target, PAIRS[number % len(PAIRS)], moments.uniform(0.0, work), gap)
         with tempfile.TemporaryDirectory() as folder:
-            _RUN.get(target, _node)(one, number // len(PAIRS), pathlib.Path(folder))
+            _RUN.get(target, _node)(one, pathlib.Path(folder))
         yield one
 
 

@@ -104,7 +104,7 @@ def lab(tmp_path_factory):
     lab.processes = [
         subprocess.Popen(
             [
-                *(sys.executable, '-m', f'ros_pad.nodes.{node}', '--ros-args'),
+                *(sys.executable, '-m', 'ros_pad.nodes.start', node, '--ros-args'),
                 *('-r', '__ns:=/lab', '-r', f'__node:=other_{node}'),
                 *('-r', 'feet/pressure:=feet/air', '-r', 'leg_1/pressure:=leg_1/air'),
                 *('--params-file', str(shipped), '--params-file', str(mine)),

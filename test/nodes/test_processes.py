@@ -41,7 +41,7 @@ PARAMETERS = {
 def start(name, *parameters):
     arguments = [word for parameter in parameters for word in ('-p', parameter)]
     return subprocess.Popen(
-        [sys.executable, '-m', f'ros_pad.nodes.{name}', '--ros-args', *arguments],
+        [sys.executable, '-m', 'ros_pad.nodes.start', name, '--ros-args', *arguments],
         stderr=subprocess.PIPE,
         text=True,
     )

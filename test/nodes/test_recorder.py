@@ -419,7 +419,7 @@ def test_a_full_disk_is_not_silent(robot, record, until, monkeypatch):
 def start(*parameters):
     arguments = [word for parameter in parameters for word in ('-p', parameter)]
     return subprocess.Popen(
-        [sys.executable, '-m', 'ros_pad.nodes.recorder', '--ros-args', *arguments],
+        [sys.executable, '-m', 'ros_pad.nodes.start', 'recorder', '--ros-args', *arguments],
         stderr=subprocess.PIPE,
         text=True,
     )

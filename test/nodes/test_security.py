@@ -49,12 +49,6 @@ AT_TIMES = {
     # With the first message of a driver:
     *(('merge', 'publish', f'/feet/{name}') for name in ('sample', 'force', 'pressure')),
     *((name, 'subscribe', '/clock') for name in SERVING),
-    # The recorder requests parameters of the nodes that run.
-    *(
-        ('recorder', 'request', f'/{node}/{verb}_parameters')
-        for node in SERVING
-        for verb in ('list', 'get')
-    ),
 }
 
 
@@ -127,10 +121,4 @@ def test_only_the_controller_may_move_pads_and_only_an_operator_may_call():
     assert movers('/feet/command') == {'controller'}
     assert movers('/leg_3/pressure_setpoint') == {'views'}  # for regulators of others
     assert movers('/feet/pressure') == {'regulator', 'merge'}
-    asking = {name for name, kind in policy if kind == 'request'}
-    assert asking == {'operator', 'recorder'}
-    # The recorder may read parameters, and no more.
-    assert all(
-        each.endswith(('/list_parameters', '/get_parameters'))
-        for each in policy['recorder', 'request']
-    )
+    assert {name for name, kind in policy if kind == 'request'} == {'operator'}

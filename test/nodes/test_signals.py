@@ -17,7 +17,7 @@ NODES = ('recorder', 'regulator', 'estimator', 'controller', 'simulator')
 SCRIPTS = pathlib.Path(sys.executable).parent
 FORMS = {
     'script': lambda name: [str(SCRIPTS / f'{name}_node')],
-    'module': lambda name: [sys.executable, '-m', f'ros_pad.nodes.{name}'],
+    'module': lambda name: [sys.executable, '-m', 'ros_pad.nodes.start', name],
 }
 WALK = ('run', 'hexapod_patches', '--policy', 'dome', '--cycles', '30', '--out', 'out')
 
