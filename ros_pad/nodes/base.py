@@ -10,24 +10,25 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import String
 
 from ros_pad.bags import topics
 from ros_pad.bags.codec import field_getter, message_type, put_field
-from ros_pad.bags.topics import Topic
+from ros_pad.bags.topics import STAMP, Topic
 from ros_pad.bags.wire import Wire
-from ros_pad.nodes.parameters import Parameter, declare, values_of
-from ros_pad.nodes.qos import message_class, publisher, subscription
+from ros_pad.nodes.parameters import Parameter, declare
+from ros_pad.nodes.qos import publisher, subscription
 from ros_pad.pace import LATE, TICK_PERIOD_NS, Pace
 from ros_pad.records import Block, split
+from ros_pad.regulators.channel import Level
+
+_DIAGNOSTICS = message_type(topics.DIAGNOSTICS.type_name)
+_Status = type(_DIAGNOSTICS.blank('diagnostic_msgs/msg/DiagnosticStatus'))
+_KeyValue = type(_DIAGNOSTICS.blank('diagnostic_msgs/msg/KeyValue'))
 
 OLDEST = 0.1
 """Age of the last sample, s, from which a node that needs samples counts as late."""
@@ -64,13 +65,13 @@ class PadNode(Node):
         When a parameter is not allowed.
     """
 
-    OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+    OK, WARN, ERROR = Level.OK, Level.WARN, Level.ERROR
 
     def __init__(self, name: str, parameters: Sequence[Parameter], **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self.prepare()
         self.values = declare(self, parameters, self.permit, self.apply)
-        self._send_parameters = self.output(topics.PARAMETERS)
+        self._send_parameters = self.sender(topics.PARAMETERS, topics.PARAMETERS.values)
         self._publish_parameters()
         self.add_post_set_parameters_callback(self._publish_parameters)
         handle = self.get_clock().handle
@@ -82,7 +83,7 @@ class PadNode(Node):
         self._record_ns = 0  # stamp of the last record that was processed
         self._tick: Callable[[int], object] = lambda now_ns: None
         self._pace, self._since_ns, self._counted = Pace(1_000_000_000), self.now_ns(), 0
-        self._send_health = self.output(topics.DIAGNOSTICS)
+        self._send_health = self.sender(topics.DIAGNOSTICS, (*STAMP, 'status'))
 
     def prepare(self) -> None:
         """Change what is given for the parameters, before they are declared."""
@@ -95,22 +96,11 @@ class PadNode(Node):
 
     def _publish_parameters(self, changes: Sequence[object] = ()) -> None:
         """Tell recorders the values of all parameters; who comes later hears of them, too."""
-        values = {self.get_fully_qualified_name(): values_of(self)}
-        self._send_parameters(String(data=json.dumps(values)))
+        known = self.get_parameters(sorted(self.get_parameters_by_prefix('')))
+        told = {self.get_fully_qualified_name(): {each.name: each.value for each in known}}
+        self._send_parameters(json.dumps(told, default=list))
 
     # --- messages ------------------------------------------------------------------------------
-
-    def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
-        """Return a function that publishes whole messages, or their bytes."""
-        publish, of_type = publisher(self, topic, leg).publish, message_type(topic.type_name)
-
-        def send(message: Any) -> None:
-            if not isinstance(message, bytes):
-                # rclpy leaves what was in memory between numbers: a trial has the same bytes.
-                message = of_type.encode(of_type.decode(serialize_message(message)))
-            publish(message)
-
-        return send
 
     def sender(
         self,
@@ -119,9 +109,9 @@ class PadNode(Node):
         leg: int | None = None,
         constants: Mapping[str, Any] | None = None,
     ) -> Callable[..., None]:
-        """Return a function that sends a message with these numbers, in the order of `paths`.
+        """Return a function that sends a message with these values, in the order of `paths`.
 
-        The frame is that of the table of topics, other fields are zero.
+        The frame is that of the table of topics, other fields are zero or empty.
         """
         publish, of_type = publisher(self, topic, leg).publish, message_type(topic.type_name)
         message = of_type.blank()
@@ -129,7 +119,7 @@ class PadNode(Node):
         for path, value in (frame | dict(constants or {})).items():
             put_field(message, path, value)
 
-        def send(*values: float) -> None:
+        def send(*values: Any) -> None:
             for path, value in zip(paths, values, strict=True):
                 put_field(message, path, value)
             publish(of_type.encode(message))
@@ -159,12 +149,12 @@ class PadNode(Node):
         leg: int | None = None,
     ) -> None:
         """Call a function with some fields of each message; without paths, with the message."""
-        if paths:
-            get, decode = field_getter(paths), message_type(topic.type_name).decode
-            self._receive(topic, leg, decode, lambda message: callback(*get(message)))
-        else:
-            kind = message_class(topic.type_name)
-            self._receive(topic, leg, lambda data: deserialize_message(data, kind), callback)
+        decode = message_type(topic.type_name).decode
+        if not paths:
+            self._receive(topic, leg, decode, callback)
+            return
+        get = field_getter(paths)
+        self._receive(topic, leg, decode, lambda message: callback(*get(message)))
 
     def _receive(
         self,
@@ -243,21 +233,22 @@ class PadNode(Node):
     def status(
         self,
         name: str,
-        level: bytes,
+        level: Level,
         message: str,
         values: Mapping[str, object] | None = None,
         part: str = '',
-    ) -> DiagnosticStatus:
+    ) -> Any:
         """Return a status of this node, with values by name, and the part that it is about."""
-        return DiagnosticStatus(
+        pairs = [_KeyValue(key=key, value=str(each)) for key, each in (values or {}).items()]
+        return _Status(
             name=f'{self.get_name()}: {name}',
             hardware_id=part,
             level=level,
             message=message,
-            values=[KeyValue(key=key, value=str(each)) for key, each in (values or {}).items()],
+            values=pairs,
         )
 
-    def rate(self, now_ns: int, samples: int, last_ns: int) -> list[DiagnosticStatus]:
+    def rate(self, now_ns: int, samples: int, last_ns: int) -> list[Any]:
         """Return rate and age of samples, of which so many have come; in real time only."""
         if self.simulated:
             return []
@@ -273,17 +264,9 @@ class PadNode(Node):
             return [self.status('rate', self.WARN, text, values)]
         return [self.status('rate', self.OK, f'{rate:.0f} samples a second', values)]
 
-    def report(self, now_ns: int, statuses: Sequence[DiagnosticStatus]) -> None:
+    def report(self, now_ns: int, statuses: Iterable[Any]) -> None:
         """Publish these on ``/diagnostics``, and which messages were refused."""
-        array = DiagnosticArray(status=list(statuses))
+        every = list(statuses)
         if self.refused:
-            array.status.append(
-                self.status('refused messages', self.WARN, self._reason, self.refused)
-            )
-        set_stamp(array.header.stamp, now_ns)
-        self._send_health(array)
-
-
-def set_stamp(stamp: Time, time_ns: int) -> None:
-    """Write a time in ns into a stamp; see :func:`ros_pad.records.split`."""
-    stamp.sec, stamp.nanosec = split(time_ns)
+            every.append(self.status('refused messages', self.WARN, self._reason, self.refused))
+        self._send_health(*split(now_ns), every)

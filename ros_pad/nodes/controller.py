@@ -7,8 +7,6 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
-
 from ros_pad.bags import topics
 from ros_pad.control import COMMAND_TIMEOUT, POLICIES, MorphologyController
 from ros_pad.control.morphology import LIFT_OFF, MARGIN
@@ -112,7 +110,7 @@ class ControllerNode(PadNode):
         if self.due(now_ns, [self.controller.fault(leg) for leg in self._legs]):
             self.report(now_ns, [self._pad(leg) for leg in self._legs])
 
-    def _pad(self, leg: int) -> DiagnosticStatus:
+    def _pad(self, leg: int) -> Any:
         """Return the state of a leg for ``/diagnostics``."""
         controller, monitor = self.controller, self.controller.monitor(leg)
         morphology = controller.morphology(leg)

@@ -10,8 +10,6 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
-
 from ros_pad.bags import topics
 from ros_pad.errors import InvalidInput, PadError
 from ros_pad.estimation import SETTINGS
@@ -124,7 +122,7 @@ class EstimatorNode(PadNode):
             rate = self.rate(now_ns, self.stage.samples, self.stage.last_ns)
             self.report(now_ns, [*feet, self._learnt_status(), *rate])
 
-    def _foot(self, index: int, row: Any, healthy: bool) -> DiagnosticStatus:
+    def _foot(self, index: int, row: Any, healthy: bool) -> Any:
         """Return the health of the sensors of a foot, and its estimate, for ``/diagnostics``."""
         leg, noise = self._legs[index], self.stage.estimator.tracks[index].watch.noise
         values = {
@@ -139,7 +137,7 @@ class EstimatorNode(PadNode):
         level = self.OK if healthy else self.ERROR
         return self.status(f'leg {leg} sensing', level, text, values, f'foot {leg}')
 
-    def _learnt_status(self) -> DiagnosticStatus:
+    def _learnt_status(self) -> Any:
         """Return the scales of friction with their intervals, for ``/diagnostics``."""
         values = {}
         for name, scale in self.stage.estimator.shared.scales.items():

@@ -315,7 +315,7 @@ class RegulatorNode(PadNode, LifecycleNode):
         self.report(
             now_ns,
             [
-                self.status(name, bytes([level]), message, figures, f'{backend} {part}')
+                self.status(name, level, message, figures, f'{backend} {part}')
                 for name, part, (level, message), figures in parts
             ],
         )

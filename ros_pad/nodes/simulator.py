@@ -19,6 +19,7 @@ from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.parameters import SCENE, SEED, Parameter
+from ros_pad.nodes.qos import publisher
 from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, RealTime
 from ros_pad.records import SAMPLE, Block, split
 from ros_pad.simulation import fidelity
@@ -135,7 +136,7 @@ class SimulatorNode(PadNode):
         measured += ['moment'] * bool(noise.moment)
         record = topics.FORCE if self._body_sensors else topics.SAMPLE
         outputs = {
-            'markers': self.output(topics.MARKERS),
+            'markers': publisher(self, topics.MARKERS).publish,
             'pose': self.sender(topics.BODY_POSE, (*STAMP, *pose)),
             'record': self.record_output(record, self.scene.legs, measured),
         }

@@ -14,7 +14,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import String
 
 from ros_pad.bags import topics
 from ros_pad.bags.topics import STAMP, Topic
@@ -23,6 +22,7 @@ from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.markers import array_of, marker_of_foot
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
+from ros_pad.nodes.qos import publisher
 from ros_pad.pace import Pace
 from ros_pad.records import Block, split
 
@@ -68,7 +68,7 @@ class ViewsNode(PadNode):
             if shows:
                 self.receive_record(record, self._legs, partial(self._show, shows))
         self.receive_record(topics.ESTIMATE, self._legs, self._mark)
-        self._send_markers = self.output(topics.FEET_MARKERS)
+        self._send_markers = publisher(self, topics.FEET_MARKERS).publish
         self._markers_pace = Pace(MARKERS_PERIOD_NS)
         self._places = np.full((len(self._legs), 2), np.nan)
 
@@ -91,13 +91,13 @@ class ViewsNode(PadNode):
 
     def _text(self, topic: Topic, leg: int, text_of: Callable[[Any], str | None]) -> Show:
         """Return a function that publishes a text of a leg when it changes."""
-        publish, last = self.output(topic, leg), ['?']
+        send, last = self.sender(topic, topic.values, leg), ['?']
 
         def show(stamp_ns: int, row: np.ndarray) -> None:
             text = text_of(row)
             if text is not None and text != last[0]:
                 last[0] = text
-                publish(String(data=text))
+                send(text)
 
         return show
 
@@ -116,9 +116,7 @@ class ViewsNode(PadNode):
         if self.refused and self.due(block.last_ns):
             self.report(block.last_ns, [])
         feet = zip(self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True)
-        markers = [
-            marker_of_foot(leg, at, wet) for leg, at, wet in feet if math.isfinite(sum(at))
-        ]
+        markers = [marker_of_foot(leg, at, wet) for leg, at, wet in feet if math.isfinite(sum(at))]
         self._send_markers(array_of(markers, block.last_ns, self.values['frame']))
 
 

@@ -2,26 +2,13 @@
 """What all nodes have in common: ticks, stamps, and QoS of topics."""
 
 import pytest
-from builtin_interfaces.msg import Time
-from helpers import MS, nanoseconds
+from helpers import MS
 from rclpy.qos import DurabilityPolicy, QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 
 from ros_pad.bags import topics
 from ros_pad.nodes import qos
-from ros_pad.nodes.base import PadNode, set_stamp
+from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import LEGS
-
-
-@pytest.mark.parametrize(
-    ('time_ns', 'sec', 'nanosec'),
-    [(0, 0, 0), (999_999_999, 0, 999_999_999), (-1, -1, 999_999_999)],
-)
-def test_stamps_are_whole_nanoseconds(time_ns, sec, nanosec):
-    for late_ns in (0, 2**32 * 10**9):  # a stamp has no more seconds
-        stamp = Time()
-        set_stamp(stamp, time_ns + late_ns)
-        assert (stamp.sec, stamp.nanosec) == (sec, nanosec)
-        assert nanoseconds(stamp) == time_ns
 
 
 @pytest.mark.parametrize('all_steps', [False, True])
