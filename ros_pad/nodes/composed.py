@@ -176,7 +176,8 @@ class ComposedTrial:
             **own,
         )
         own = {'fidelity': fidelity, 'sensing': sensing, 'publish_clock': True}
-        self.simulator = self._add(SimulatorNode, foot=foot, free_running=False, **own, **ground)
+        stepped = partial(SimulatorNode, False)
+        self.simulator = self._add(stepped, foot=foot, **own, **ground)
 
     def _discover(self) -> None:
         deadline = time.monotonic() + PATIENCE

@@ -142,10 +142,8 @@ class Bench:
 
     def start(self, kind: Callable[..., Any], **parameters: Any) -> Any:
         """Start a node, unless told otherwise with legs 1 and 2 and in simulated time."""
-        values = {'use_sim_time': True} | parameters
-        if kind.__name__ != 'SimulatorNode':
-            values = {'legs': list(self.legs)} | values
-            self.legs = tuple(values['legs'])
+        values = {'use_sim_time': True, 'legs': list(self.legs)} | parameters
+        self.legs = tuple(values['legs'])
         self.node = kind(context=self._context, parameter_overrides=overrides(values))
         self._executor.add_node(self.node)
         self.nodes.append(self.node)
