@@ -108,23 +108,17 @@ def recording(topic: Topic, reliable: bool) -> QoSProfile:
 
 def offered(topic: Topic) -> str:
     """Return what publishers of a topic offer, as YAML text, in the form of bags of ROS 2."""
-    profile, infinite = profiles(topic).publish, {'sec': 9223372036, 'nsec': 854775807}
-    return yaml.safe_dump(
-        [
-            {
-                'history': profile.history.name.lower(),
-                'depth': profile.depth,
-                'reliability': profile.reliability.name.lower(),
-                'durability': profile.durability.name.lower(),
-                'deadline': dict(infinite),
-                'lifespan': dict(infinite),
-                'liveliness': 'automatic',
-                'liveliness_lease_duration': dict(infinite),
-                'avoid_ros_namespace_conventions': False,
-            }
-        ],
-        sort_keys=False,
-    )
+    profile = profiles(topic).publish
+    policies = {
+        name: getattr(profile, name).name.lower()
+        for name in ('history', 'reliability', 'durability')
+    }
+    times = {
+        name: {'sec': 9223372036, 'nsec': 854775807}  # no limit
+        for name in ('deadline', 'lifespan', 'liveliness_lease_duration')
+    }
+    others = {'liveliness': 'automatic', 'avoid_ros_namespace_conventions': False}
+    return yaml.safe_dump([{**policies, 'depth': profile.depth, **times, **others}])
 
 
 @functools.cache
