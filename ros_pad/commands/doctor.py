@@ -335,7 +335,7 @@ def which_ros(path: str, sources: dict[str, str]) -> Finding:
 def loopback(patience: float = LOOPBACK) -> Finding:
     """Send a message from one process to another, within ``patience`` s once both have started."""
     words = [f'/ros_pad_doctor_{uuid.uuid4().hex}', uuid.uuid4().hex]
-    words += ['--seconds', str(STARTING + patience)]
+    words.append(str(STARTING + patience))
     children = [
         subprocess.Popen(
             [sys.executable, '-m', 'ros_pad.nodes.loopback', end, *words],

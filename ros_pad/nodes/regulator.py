@@ -14,7 +14,6 @@ from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
 from ros_pad.bags import topics
-from ros_pad.contact.resistance import Foot
 from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.errors import ConfigError
 from ros_pad.estimation.stage import PUBLISH_RATE
@@ -27,7 +26,6 @@ from ros_pad.regulators.channel import (
     CEILING_TOLERANCE,
     ON_FAULT,
     SLEW_LIMIT,
-    Health,
     SupervisedChannel,
     SupervisorSettings,
 )
@@ -93,12 +91,21 @@ class RegulatorNode(PadNode, LifecycleNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('regulator', PARAMETERS, **kwargs)
-        self._check_parameters()
         values, legs = self.values, self.values['legs']
+        backend, foot = values['backend'], values['foot']
+        if self.simulated and backend != 'simulated':
+            raise ConfigError(
+                f'node {self.get_name()}: parameter use_sim_time = True is not allowed with'
+                f' backend {backend}: if /clock stops, its pads stay under pressure'
+            )
+        if values['ceiling'] > foot.ceiling:
+            raise ConfigError(
+                f'node {self.get_name()}: parameter ceiling = {values["ceiling"]:g} Pa is'
+                f' not allowed: the ceiling of foot {foot.source} is {foot.ceiling:g} Pa'
+            )
         self._read_pace = Pace(round(1e9 / values['publish_rate']))
         self._check_pace = Pace(TICK_PERIOD_NS)
         self.tick_ns = 0
-        self._elapsed_ns = 0  # the same on the clock that measures the age of commands
         self._problem: Exception | None = None  # why the last configuration failed
         self._send = self.record_output(topics.PRESSURE, legs)
         self.receive_record(topics.COMMAND, legs, self._on_command)
@@ -114,20 +121,6 @@ class RegulatorNode(PadNode, LifecycleNode):
                 raise self._problem
             self.trigger_activate()
             self._starting = False
-
-    def _check_parameters(self) -> None:
-        """Refuse values that are not allowed together."""
-        backend, foot = self.values['backend'], self.values['foot']
-        if self.simulated and backend != 'simulated':
-            raise ConfigError(
-                f'node {self.get_name()}: parameter use_sim_time = True is not allowed with'
-                f' backend {backend}: if /clock stops, its pads stay under pressure'
-            )
-        if self.values['ceiling'] > foot.ceiling:
-            raise ConfigError(
-                f'node {self.get_name()}: parameter ceiling = {self.values["ceiling"]:g} Pa is'
-                f' not allowed: the ceiling of foot {foot.source} is {foot.ceiling:g} Pa'
-            )
 
     def _check_options(self, changes: list[RosParameter]) -> SetParametersResult:
         """Refuse changes of backend options while devices are open; *configure* reads them."""
@@ -174,14 +167,15 @@ class RegulatorNode(PadNode, LifecycleNode):
 
     def _backend_options(self) -> dict[str, Any]:
         """Return the options of the backend: one value for all legs, or a list with one a leg."""
-        options: dict[str, Any] = {}
-        if self.values['backend'] == 'simulated':
-            begun = 0.0 if self.simulated else time.monotonic()
-            now = (lambda: self._elapsed_ns * 1e-9) if self.simulated else time.monotonic
-            foot: Foot = self.values['foot']
-            options = {'clock': lambda: now() - begun, 'pad_volume': foot.air_volume}
-            if self.values['scene']:
-                options |= self.values['scene'].regulator_options
+        values, options = self.values, {}
+        if values['backend'] == 'simulated':
+            begun_ns = self._elapsed(0)
+            options = {
+                'clock': lambda: 1e-9 * (self._elapsed(self.tick_ns) - begun_ns),
+                'pad_volume': values['foot'].air_volume,
+            }
+            if values['scene']:
+                options |= values['scene'].regulator_options
         for name in self.get_parameters_by_prefix(BACKEND_OPTIONS):
             options[name] = plain(self.get_parameter(f'{BACKEND_OPTIONS}.{name}').value)
         if 'ceiling' in options:
@@ -286,12 +280,12 @@ class RegulatorNode(PadNode, LifecycleNode):
         if answers and abs(now_ns - self._record_ns) <= TICK_PERIOD_NS:
             return
         if self._read_pace.due(now_ns) and self.supervision.channels:
-            self._send(self.supervision.read(now_ns, self._elapsed_ns))
+            self._send(self.supervision.read(now_ns, self._elapsed(now_ns)))
 
     def _supervise(self, now_ns: int) -> None:
         """Vent pads without commands, and report on ``/diagnostics``."""
-        self.tick_ns, self._elapsed_ns = now_ns, self._elapsed(now_ns)
-        self.supervision.tick(self._elapsed_ns)
+        self.tick_ns = now_ns
+        self.supervision.tick(self._elapsed(now_ns))
         if self._check_pace.due(now_ns):
             self._diagnose(now_ns)
 
@@ -305,22 +299,21 @@ class RegulatorNode(PadNode, LifecycleNode):
         refused = any(each.answers.due for each in channels)
         if not (self.due(now_ns, problems) or refused):
             return
-        parts: list[tuple[str, object, Health, Mapping[str, object]]] = [
-            (f'leg {each.leg} regulator', each.leg, each.answers.report(health), each.figures())
+        backend = self.values['backend']
+        statuses = [
+            self.status(
+                f'leg {each.leg} regulator',
+                *each.answers.report(health),
+                each.figures(),
+                f'{backend} {each.leg}',
+            )
             for each, health in zip(channels, found, strict=True)
         ]
         if channels:
-            parts.append(('supply', 'supply', supply, {}))
-        backend = self.values['backend']
-        self.report(
-            now_ns,
-            [
-                self.status(name, level, message, figures, f'{backend} {part}')
-                for name, part, (level, message), figures in parts
-            ],
-        )
+            statuses.append(self.status('supply', *supply, part=f'{backend} supply'))
+        self.report(now_ns, statuses)
 
 
 def _settings(values: Mapping[str, Any]) -> SupervisorSettings:
-    names = [each.name for each in fields(SupervisorSettings)]
-    return SupervisorSettings(**{name: values[name] for name in names})
+    own = {each.name: values[each.name] for each in fields(SupervisorSettings)}
+    return SupervisorSettings(**own)
