@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+import importlib
+import subprocess
+import sys
+import time
 from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
@@ -26,8 +30,34 @@ MS = 1_000_000
 SECOND = 1_000 * MS
 AMBIENT = 101325.0
 SIX = (1, 2, 3, 4, 5, 6)
+NODES = (
+    'simulator', 'body_estimator', 'estimator', 'controller', 'regulator', 'merge', 'views',
+    'recorder',
+)  # fmt: skip
 LOAD = 6.83
 """Load of a foot in stance, N."""
+
+
+def wait_for(condition, what='the condition', turn=lambda: time.sleep(0.01), seconds=60.0):
+    """Call ``turn`` until a condition holds, and return what it is; fail after some seconds."""
+    deadline = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < deadline, f'waited for {what}: timeout after {seconds:g} s'
+        turn()
+    return found
+
+
+def start_node(name: str, *parameters: str) -> subprocess.Popen[str]:
+    """Start a node in a process of its own, with parameters such as ``legs:=[1]``."""
+    given = [word for each in parameters for word in ('-p', each)]
+    command = [sys.executable, '-m', 'ros_pad.nodes.start', name, '--ros-args', *given]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def node_class(name: str) -> Any:
+    """Return the class of a node, whose module has its parameters."""
+    module = importlib.import_module(f'ros_pad.nodes.{name}')
+    return getattr(module, f'{name.title().replace("_", "")}Node')
 
 
 def nanoseconds(stamp: Time) -> int:

@@ -2,8 +2,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 import warnings
 
@@ -12,7 +10,7 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
-from helpers import MS, SECOND, SIX, encoded, header, overrides
+from helpers import MS, SECOND, SIX, encoded, header, overrides, start_node
 from helpers import record as record_of
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -245,7 +243,7 @@ def test_the_parameters_of_the_nodes_and_their_changes_are_in_the_bag(
 def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     driver = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     publisher = robot.create_publisher(PoseStamped, 'body/pose', driver)
-    process = start(f'folder:={tmp_path / "trial"}')
+    process = start_node('recorder', f'folder:={tmp_path / "trial"}')
     sent = 0
     statuses = []
     qos.subscription(robot, topics.DIAGNOSTICS, lambda array: statuses.extend(array.status))
@@ -353,20 +351,11 @@ def test_a_full_disk_is_not_silent(robot, record, until, monkeypatch):
     recorder.close()
 
 
-def start(*parameters):
-    arguments = [word for parameter in parameters for word in ('-p', parameter)]
-    return subprocess.Popen(
-        [sys.executable, '-m', 'ros_pad.nodes.start', 'recorder', '--ros-args', *arguments],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
 @pytest.mark.parametrize('number_of_signal', [signal.SIGINT, signal.SIGTERM])
 def test_signals_close_the_bag(number_of_signal, robot, until, tmp_path):
     publisher = robot.create_publisher(JointState, 'feet/estimate', KEPT)
     folder = tmp_path / 'trial'
-    process = start(f'folder:={folder}', 'reliable:=true')
+    process = start_node('recorder', f'folder:={folder}', 'reliable:=true')
     try:
         until(lambda: publisher.get_subscription_count())
         for number in range(100):
