@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import AMBIENT, MS, SECOND, command, overrides
+from helpers import AMBIENT, MS, SECOND, Device, command, overrides
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import SetParameters
@@ -25,9 +25,8 @@ from ros_pad.control.faults import Kind
 from ros_pad.errors import ConfigError, TransportError
 from ros_pad.nodes import regulator as module
 from ros_pad.nodes.regulator import RegulatorNode
-from ros_pad.regulators import BACKENDS, Reading, SimulatedRegulator
+from ros_pad.regulators import BACKENDS, SimulatedRegulator
 from ros_pad.regulators.channel import SupervisedChannel
-from ros_pad.regulators.protocol import permitted
 
 ERROR, WARN, OK, STALE = (
     getattr(DiagnosticStatus, each) for each in ('ERROR', 'WARN', 'OK', 'STALE')
@@ -96,48 +95,6 @@ class Robot:
 @pytest.fixture
 def robot(bench):
     return Robot(bench)
-
-
-class Device:
-    """A device whose cable may break."""
-
-    made = ()
-
-    def __init__(self, ceiling, port='usb'):
-        self.ceiling = ceiling
-        self.port = port
-        self.setpoint = 40e3  # of an earlier user
-        self.is_open = False
-        self.broken = None
-        self.reads = None  # pressure that is read, if not the set-point
-        self.faults = ()
-        Device.made = (*Device.made, self)
-
-    def open(self):
-        if self.port == 'none':
-            raise TransportError("no such port: 'none'")
-        self.is_open = True
-
-    def set_pressure(self, gauge_pa):
-        self.setpoint = permitted(gauge_pa, self.ceiling)
-        self._answer()  # when the cable is broken, only the answer is lost
-
-    def read(self):
-        self._answer()
-        pressure = self.setpoint if self.reads is None else self.reads
-        return Reading(pressure, self.setpoint, self.faults, 0.0)
-
-    def vent(self):
-        self._answer()
-        self.setpoint = 0.0
-
-    def close(self):
-        self.is_open = False
-
-    def _answer(self):
-        assert self.is_open
-        if self.broken:
-            raise self.broken
 
 
 @pytest.fixture
