@@ -2,6 +2,7 @@
 """The body estimator node on messages of a robot that stands."""
 
 import math
+import pathlib
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from ros_pad.records import SAMPLE
 from ros_pad.robots import Robot as Kinematics
 
 LEGS = (1, 2, 3, 4, 5, 6)
+QUADRUPED = pathlib.Path(__file__).parents[2] / 'bags' / 'quadruped' / 'robot.urdf'
 CH3R = Kinematics.load('ch3r')
 SHARE = CH3R.mass * 9.81 / 6.0
 NONE = (math.nan, math.nan, math.nan)
@@ -156,21 +158,12 @@ def test_another_robots_topics_by_a_mapping(robot, tmp_path):
     assert np.isinf(rows[-1]['variance']).all()
 
 
-def test_joints_are_matched_by_name(robot):
-    robot.start()
-    order = [*reversed(range(18))]
-    names = ['head', *(CH3R.joint_names[place] for place in order)]
-    robot.stand(40, names, position=[7.0, *CH3R.home.ravel()[order]], velocity=np.zeros(19))
-    assert robot.samples()[1][-1]['position'] == pytest.approx([0.0, 0.224, -0.141], abs=2e-3)
-
-
 @pytest.mark.parametrize(
     ('spoil', 'reason'),
     [
         (lambda robot, ms: robot.imu(ms, covariance=-1.0), 'angular_velocity_covariance'),
         (lambda robot, ms: robot.joints(ms, CH3R.joint_names[1:]), 'without leg_1_coxa'),
         (lambda robot, ms: robot.joints(ms, position=[0.0] * 17), '17 values in position'),
-        (lambda robot, ms: robot.joints(ms, effort=[0.0]), '1 values in effort'),
         (lambda robot, ms: robot.forces(ms, (1e300, 0.0, 0.0)), 'force'),
     ],
 )
@@ -205,11 +198,15 @@ def test_a_reading_that_is_missing_leaves_a_gap_and_no_more(robot, missing, capf
     assert 'reading ignored' not in capfd.readouterr().err
 
 
-def test_neither_forces_nor_efforts(robot):
-    robot.start(forces='efforts')
-    robot.stand(40)
-    assert robot.doubt() == 'force: neither foot forces nor efforts'
-    assert np.isinf(robot.samples()[1][-1]['variance']).all()
+def test_a_robot_of_a_urdf(robot):
+    robot.start(
+        robot=str(QUADRUPED),
+        feet='FL_foot, FR_foot, RL_foot, RR_foot',
+        imu_link='imu',
+        foot_radius=0.022,
+        legs=[1, 2, 3, 4],
+    )
+    assert robot.status().hardware_id == 'quadruped'
 
 
 @pytest.mark.parametrize(

@@ -147,16 +147,6 @@ def test_a_pressure_that_is_missing_leaves_the_last_one_in_force(robot):
     assert 'domed' not in robot.doubts(2)
 
 
-def test_evidence_of_a_pull_depends_on_the_morphology(robot):
-    """A dome sticks equally well on wet and dry ground; pressure shows whether the foot is one."""
-    robot.start()
-    robot.bench.give(topics.PRESSURE, pressure(1, (75e3, 0.0)))
-    robot.stance(ratio=0.3, speed=0.0)
-    domed, flat = (robot.heard('wetness', leg)[-1] for leg in (1, 2))
-    assert abs(domed - 0.5) < 0.2
-    assert flat < 0.2
-
-
 # --- doubts -------------------------------------------------------------------------------------
 
 

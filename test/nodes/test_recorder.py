@@ -169,20 +169,6 @@ def test_what_was_latched_before_is_recorded(robot, record, until, tmp_path):
     assert (topic, message.data) == ('/body/doubt', 'slips')
 
 
-def test_a_best_effort_driver_is_recorded_too(robot, record, until, tmp_path):
-    recorder = record()
-    reliable = qos.publisher(robot, topics.SAMPLE)
-    until(lambda: reliable.get_subscription_count())
-    driver = robot.create_publisher(JointState, 'feet/sample', qos.SENSOR)
-    publishers = (reliable, driver)
-    until(lambda: all(p.get_subscription_count() for p in publishers))
-    for publisher in publishers:
-        publisher.publish(publisher.msg_type())
-    until(lambda: recorder.message_count == 2)
-    recorder.close()
-    assert BagReader(tmp_path / 'trial').counts['/feet/sample'] == 2
-
-
 def on_disk(folder, topic):
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
