@@ -7,7 +7,8 @@ import datetime
 import json
 import struct
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 from rclpy.subscription import Subscription
@@ -77,8 +78,6 @@ class RecorderNode(PadNode):
         When the value of a parameter is not allowed.
     """
 
-    _bag: BagWriter | None = None
-
     def __init__(self, custom_data: Mapping[str, str] | None = None, **kwargs: Any) -> None:
         super().__init__('recorder', PARAMETERS, **kwargs)
         self._clock_ns = 0
@@ -103,13 +102,13 @@ class RecorderNode(PadNode):
         self._receive(topics.PARAMETERS, None, _parameters_in, self._on_parameters)
         # In wall time, independent of the clock of the trial.
         self.every(FLUSH_PERIOD, self._look)
-        self.every(INTAKE_PERIOD, self._take)
+        self.every(INTAKE_PERIOD, partial(self._save, self._intake.take, self._write))
         self.get_logger().info(f'recording {len(self._topics)} topics into {folder}')
 
     @property
     def message_count(self) -> int:
         """Number of messages recorded so far."""
-        return self._bag.message_count if self._bag else 0
+        return self._bag.message_count
 
     @property
     def lost(self) -> dict[str, int]:
@@ -117,29 +116,24 @@ class RecorderNode(PadNode):
         return dict(self._intake.lost)
 
     @property
-    def time_ns(self) -> int:
-        """Time of the trial, ns."""
-        return self._clock_ns if self.simulated else time.time_ns()
-
-    @property
     def subscriptions(self) -> Iterator[Subscription]:
         """Subscriptions whose messages an executor takes: not the recorded ones."""
         recorded = list(self._intake.subscriptions.values())
         return (each for each in super().subscriptions if each not in recorded)
 
-    def _take(self) -> None:
+    def _save(self, work: Callable[..., object], *given: Any) -> None:
+        """Do what writes into the bag, until it fails once: the bag is closed then."""
+        if self._failed:
+            return
         try:
-            self._intake.take(self._write)
+            work(*given)
         except BagError:
-            # Raise once only: later messages fail because the bag is closed.
-            if not self._failed:
-                self._failed = True
-                raise
+            self._failed = True
+            raise
 
     def describe(self, custom_data: Mapping[str, str]) -> None:
         """Add custom data about the trial to the bag."""
-        if self._bag:
-            self._bag.describe(custom_data)
+        self._bag.describe(custom_data)
 
     def close(self) -> None:
         """Stop recording and close the bag.
@@ -149,10 +143,7 @@ class RecorderNode(PadNode):
         BagError
             When the disk is full; it says how many messages are saved.
         """
-        if not self._bag:
-            return
-        if not self._failed:
-            self._take()
+        self._save(self._intake.take, self._write)
         self._intake.close()
         self._bag.describe({label.LOST: json.dumps(self.lost)})
         self._bag.close()
@@ -165,20 +156,14 @@ class RecorderNode(PadNode):
             super().destroy_node()
 
     def _look(self) -> None:
-        """Flush the bag, also when no messages arrive, and request parameters of new nodes."""
-        if self._failed or not self._bag:
-            return
+        """Flush the bag, also when no messages arrive, and report lost ones."""
         lost = self._intake.lost.total()
         if lost > self._told:
             self._told = lost
             text = f'{LATE}: {lost} messages lost so far'
             self.get_logger().warning(text)
             self.report(self.now_ns(), [self.status('lost messages', self.WARN, text, self.lost)])
-        try:
-            self._bag.flush()
-        except BagError:
-            self._failed = True
-            raise
+        self._save(self._bag.flush)
 
     def _on_parameters(self, told: tuple[str, dict[str, Any]]) -> None:
         """Describe a node in the bag: its first parameters, and later changes."""
@@ -189,13 +174,13 @@ class RecorderNode(PadNode):
             self._first[node] = values
             self.describe({label.PARAMETERS: json.dumps(self._first)})
             return
+        at_ns = self._clock_ns if self.simulated else time.time_ns()
         changed = [name for name in values if name not in before or before[name] != values[name]]
-        self._changes += [(self.time_ns, node, name, values[name]) for name in changed]
+        self._changes += [(at_ns, node, name, values[name]) for name in changed]
         self.describe({label.CHANGES: json.dumps(self._changes)})
 
     def _write(self, name: str, data: bytes, at_ns: int) -> None:
         """Write a message that was received at a time, ns."""
-        assert self._bag
         topic, wire = self._topics[name]
         records = [(at_ns, data)]
         if wire:
