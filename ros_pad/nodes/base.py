@@ -83,7 +83,7 @@ class PadNode(Node):
         self._record_ns = 0  # stamp of the last record that was processed
         self._tick: Callable[[int], object] = lambda now_ns: None
         self._pace, self._since_ns, self._counted = Pace(1_000_000_000), self.now_ns(), 0
-        self._send_health = self.sender(topics.DIAGNOSTICS, (*STAMP, 'status'))
+        self._send_health = self.sender(topics.DIAGNOSTICS, ('status',))
 
     def prepare(self) -> None:
         """Change what is given for the parameters, before they are declared."""
@@ -105,22 +105,25 @@ class PadNode(Node):
     def sender(
         self,
         topic: Topic,
-        paths: Sequence[str],
+        paths: Sequence[str] = (),
         leg: int | None = None,
         constants: Mapping[str, Any] | None = None,
     ) -> Callable[..., None]:
         """Return a function that sends a message with these values, in the order of `paths`.
 
-        The frame is that of the table of topics, other fields are zero or empty.
+        Before them comes the time, ns, if the message has one. The frame is that of the table of
+        topics, other fields are zero or empty.
         """
         publish, of_type = publisher(self, topic, leg).publish, message_type(topic.type_name)
-        message = of_type.blank()
+        message, stamp = of_type.blank(), _stamp_of(topic)
         frame = {topics.FRAME: topic.frame.format(leg=leg)} if topic.frame else {}
         for path, value in (frame | dict(constants or {})).items():
             put_field(message, path, value)
 
         def send(*values: Any) -> None:
-            for path, value in zip(paths, values, strict=True):
+            if stamp:
+                values = (*split(values[0]), *values[1:])
+            for path, value in zip((*stamp, *paths), values, strict=True):
                 put_field(message, path, value)
             publish(of_type.encode(message))
 
@@ -148,13 +151,14 @@ class PadNode(Node):
         paths: Sequence[str] = (),
         leg: int | None = None,
     ) -> None:
-        """Call a function with some fields of each message; without paths, with the message."""
-        decode = message_type(topic.type_name).decode
-        if not paths:
-            self._receive(topic, leg, decode, callback)
-            return
-        get = field_getter(paths)
-        self._receive(topic, leg, decode, lambda message: callback(*get(message)))
+        """Call a function with the time, ns, and some fields of each message."""
+        get = field_getter((*_stamp_of(topic), *paths))
+
+        def take(message: Any) -> None:
+            seconds, fraction, *values = get(message)
+            callback(seconds * 1_000_000_000 + fraction, *values)
+
+        self._receive(topic, leg, message_type(topic.type_name).decode, take)
 
     def _receive(
         self,
@@ -208,13 +212,12 @@ class PadNode(Node):
             self.every(period, lambda: self._tick(self.now_ns()))
             return
 
-        def on_clock(seconds: int, fraction: int) -> None:
-            now_ns = seconds * 1_000_000_000 + fraction
+        def on_clock(now_ns: int) -> None:
             # Which of a record and the clock of its moment comes first must mean nothing.
             if all_steps or abs(now_ns - self._record_ns) > TICK_PERIOD_NS:
                 self._tick(now_ns)
 
-        self.receive(topics.CLOCK, on_clock, topics.CLOCK.values)
+        self.receive(topics.CLOCK, on_clock)
 
     def advance(self, stamp_ns: int) -> None:
         """Process the stamp of a record, ns, which is a tick in simulated time."""
@@ -269,4 +272,12 @@ class PadNode(Node):
         every = list(statuses)
         if self.refused:
             every.append(self.status('refused messages', self.WARN, self._reason, self.refused))
-        self._send_health(*split(now_ns), every)
+        self._send_health(now_ns, every)
+
+
+def _stamp_of(topic: Topic) -> tuple[str, ...]:
+    """Return where messages of a topic have their time, as seconds and nanoseconds."""
+    if topic is topics.CLOCK:
+        return topic.values
+    fields = dict(message_type(topic.type_name).fields(topic.type_name))
+    return STAMP if 'header' in fields else ()

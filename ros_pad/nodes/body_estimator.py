@@ -71,9 +71,9 @@ PARAMETERS = (
 )
 
 _ABSENT = ('angular_velocity_covariance[0]', 'linear_acceleration_covariance[0]')
+_JOINTS = ('name', 'position', 'velocity', 'effort')
 _TRANSFORM = 'geometry_msgs/msg/TransformStamped'
 _POSE = (
-    *STAMP,
     *(f'transform.translation.{axis}' for axis in 'xyz'),
     *(f'transform.rotation.{axis}' for axis in 'xyzw'),
 )
@@ -154,7 +154,7 @@ class BodyEstimatorNode(PadNode):
         self._samples = _Samples(self.record_output(topics.SAMPLE, legs), len(legs))
         self._doubts = self.sender(topics.BODY_DOUBT, topics.BODY_DOUBT.values)
         twist = (*(f'twist.{each}' for each in _TWIST), 'twist.covariance')
-        paths = (*STAMP, *topics.ODOM.values, 'pose.covariance', *twist)
+        paths = (*topics.ODOM.values, 'pose.covariance', *twist)
         base = {'child_frame_id': values['base_frame']}
         self._send_odom = self.sender(topics.ODOM, paths, constants=base)
         self._transform = message_type(topics.TF.type_name).blank(_TRANSFORM)
@@ -165,8 +165,8 @@ class BodyEstimatorNode(PadNode):
             self._follow(mapping)
         else:
             self.receive_record(topics.FORCE, legs, self._on_forces)
-            self.receive(topics.IMU, self._on_imu, (*STAMP, *_ABSENT, *topics.IMU.values))
-            self.receive(topics.JOINT_STATES, self._on_joints)
+            self.receive(topics.IMU, self._on_imu, (*_ABSENT, *topics.IMU.values))
+            self.receive(topics.JOINT_STATES, self._on_joints, _JOINTS)
         self.on_tick(self._look)
 
     def _follow(self, mapping: Mapping) -> None:
@@ -196,26 +196,23 @@ class BodyEstimatorNode(PadNode):
         self._samples.settle('forces', block.last_ns, self.simulated)
 
     def _on_imu(
-        self, sec: int, nanosec: int, no_gyro: float, no_accelerometer: float, *values: float
+        self, stamp_ns: int, no_gyro: float, no_accelerometer: float, *values: float
     ) -> None:
         if -1.0 in (no_gyro, no_accelerometer):  # as the message defines it
             name = 'angular_velocity' if no_gyro == -1.0 else 'linear_acceleration'
             self.stage.reject(InvalidInput(f'{name}_covariance[0] = -1: the IMU must measure it'))
             return
-        stamp_ns = sec * 1_000_000_000 + nanosec
         if math.isfinite(sum(values)):
             self._rate = np.array(values[:3])
             self.stage.imu(stamp_ns, values[:3], values[3:])
         self._samples.settle('imu', stamp_ns, self.simulated)
 
-    def _on_joints(self, message: Any) -> None:
+    def _on_joints(self, stamp_ns: int, *given: Any) -> None:
         try:
-            values = self._order(message.name, message.position, message.velocity, message.effort)
+            values = self._order(*given)
         except InvalidInput as error:
             self.stage.reject(error)
             return
-        stamp = message.header.stamp
-        stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
         if np.isfinite(values[0]).all():
             self.stage.joints(stamp_ns, *values)
         self._samples.settle('joints', stamp_ns, self.simulated)
@@ -223,13 +220,13 @@ class BodyEstimatorNode(PadNode):
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         """Publish an estimate of the body, and collect what it shows of the feet."""
         estimate = estimate._replace(doubt=estimate.doubt or self._lasting)
-        pose = [*split(stamp_ns), *estimate.position.tolist(), *estimate.orientation.tolist()]
+        pose = [*estimate.position.tolist(), *estimate.orientation.tolist()]
         rate = self._robot.imu[:3, :3] @ self._rate
         velocity, covariance = twist_of(estimate, rate, self.values['gyro_noise'])
         matrices = estimate.covariance[:6, :6].ravel(), covariance.ravel()
-        self._send_odom(*pose, matrices[0], *velocity.tolist(), matrices[1])
+        self._send_odom(stamp_ns, *pose, matrices[0], *velocity.tolist(), matrices[1])
         if self._send_tf:
-            for path, value in zip(_POSE, pose, strict=True):
+            for path, value in zip((*STAMP, *_POSE), (*split(stamp_ns), *pose), strict=True):
                 put_field(self._transform, path, value)
             self._send_tf([self._transform])
         self._samples.add(stamp_ns, sample_of(estimate))

@@ -153,6 +153,7 @@ def _marker(
     marker = _blank(name, number)  # encoded before it is filled again
     marker.ns, marker.id, marker.type, marker.action = name, number, kind, _MARKER.ADD
     marker.pose.orientation.w = 1.0
+    marker.points = []
     _put(marker.scale, 'xyz', sizes)
     _put(marker.color, 'rgba', (*rgb, opacity))
     return marker

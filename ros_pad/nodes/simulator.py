@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from ros_pad.bags import topics
-from ros_pad.bags.topics import STAMP
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError, InvalidInput, LimitError
 from ros_pad.estimation.tuning import SOURCES
@@ -21,7 +20,7 @@ from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.parameters import SCENE, SEED, Parameter
 from ros_pad.nodes.qos import publisher
 from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, RealTime
-from ros_pad.records import SAMPLE, Block, split
+from ros_pad.records import SAMPLE, Block
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import Scene
@@ -140,13 +139,13 @@ class SimulatorNode(PadNode):
             record, measured = topics.FORCE, ['force', *moment]
         outputs: dict[str, Callable[..., None]] = {
             'markers': publisher(self, topics.MARKERS).publish,
-            'pose': self.sender(topics.BODY_POSE, (*STAMP, *pose)),
+            'pose': self.sender(topics.BODY_POSE, pose),
             'record': self.record_output(record, self.scene.legs, measured),
         }
         if self.values['publish_clock']:
-            outputs['clock'] = self.sender(topics.CLOCK, topics.CLOCK.values)
+            outputs['clock'] = self.sender(topics.CLOCK)
         if names := self.robot.joint_names:
-            paths = (*STAMP, 'position', *(('velocity', 'effort') if joints else ()))
+            paths = ('position', *(('velocity', 'effort') if joints else ()))
             outputs['joints'] = self.sender(topics.JOINT_STATES, paths, constants={'name': names})
         if joints:
             covariances = {
@@ -154,8 +153,7 @@ class SimulatorNode(PadNode):
                 'angular_velocity_covariance': np.diag([noise.gyro**2] * 3).ravel(),
                 'linear_acceleration_covariance': np.diag([noise.accelerometer**2] * 3).ravel(),
             }
-            paths = (*STAMP, *topics.IMU.values)
-            outputs['imu'] = self.sender(topics.IMU, paths, constants=covariances)
+            outputs['imu'] = self.sender(topics.IMU, topics.IMU.values, constants=covariances)
         return outputs
 
     def _on_pressure(self, block: Block) -> None:
@@ -229,24 +227,24 @@ class SimulatorNode(PadNode):
         for row, stamp_ns in zip(rows, stamps.tolist(), strict=True):
             count += 1
             self.robot.step(self.pressures)
-            stamp = split(stamp_ns)
             x, y, heading = self.robot.body
-            self._outputs['pose'](*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
+            turn = math.sin(0.5 * heading), math.cos(0.5 * heading)
+            self._outputs['pose'](stamp_ns, x, y, *turn)
             if isinstance(self._sensors, Sensors):
                 row[:] = self._sensors.sample(self.robot)
             else:
                 assert isinstance(self.robot, FullRobot)
                 reading = self._sensors.read(self.robot.proprioception(), self.robot.time)
                 row[:] = reading.rows
-                later.append(('imu', (*stamp, *reading.imu.ravel().tolist())))
-                later.append(('joints', (*stamp, *reading.joints)))
+                later.append(('imu', (stamp_ns, *reading.imu.ravel().tolist())))
+                later.append(('joints', (stamp_ns, *reading.joints)))
             if self.robot.verdict and simulated:
                 break
         self._last_ns = stamp_ns
         self.tick(count)
         self._outputs['record'](Block(stamps[:count], rows[:count]))
         if self.robot.joint_names and not later:
-            later.append(('joints', (*stamp, self.robot.joint_positions)))
+            later.append(('joints', (stamp_ns, self.robot.joint_positions)))
         for name, values in later:
             self._outputs[name](*values)
         if self._markers_pace.due(stamp_ns):
@@ -259,4 +257,4 @@ class SimulatorNode(PadNode):
         self.time_ns += samples * self.period_ns
         if self.values['publish_clock']:
             self._last_ns = self.time_ns
-            self._outputs['clock'](*split(self.time_ns))
+            self._outputs['clock'](self.time_ns)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ros_pad.bags import topics
-from ros_pad.bags.topics import STAMP, Topic
+from ros_pad.bags.topics import Topic
 from ros_pad.control.policies import DOME, FLAT
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes.base import PadNode
@@ -24,7 +24,7 @@ from ros_pad.nodes.markers import array_of, marker_of_foot
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
 from ros_pad.nodes.qos import publisher
 from ros_pad.pace import Pace
-from ros_pad.records import Block, split
+from ros_pad.records import Block
 
 SHOWN = [each for each in topics.OF_LEGS if each is not topics.LEG_FOOT_WRENCH]
 """Topics of a leg that records have."""
@@ -74,7 +74,7 @@ class ViewsNode(PadNode):
 
     def _numbers(self, topic: Topic, leg: int) -> Show:
         """Return a function that publishes numbers of a leg, if none of them is missing."""
-        send = self.sender(topic, (*(STAMP if topic.frame else ()), *topic.values), leg)
+        send = self.sender(topic, topic.values, leg)
         assert topic.record
         columns = [topic.record.columns.index(each) for each in topic.columns]
         needed = slice(0, 3) if topic is topics.LEG_WRENCH else slice(None)
@@ -85,7 +85,7 @@ class ViewsNode(PadNode):
                 return
             numbers = np.nan_to_num(numbers, posinf=np.inf)
             values = topics.from_record(topic, numbers, self.values['ambient_pressure'])
-            send(*(split(stamp_ns) if topic.frame else ()), *values.tolist())
+            send(*([stamp_ns] if topic.frame else []), *values.tolist())
 
         return show
 

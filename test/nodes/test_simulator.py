@@ -27,9 +27,9 @@ def start(bench):
     """Return a function that starts a simulator which the test steps."""
 
     def start(**parameters):
-        bench.sent.clear()
         node = bench.start(partial(SimulatorNode, False), **(STEPPED | parameters))
         bench.legs = tuple(node.scene.legs)
+        bench.sent.clear()
         return node
 
     return start
