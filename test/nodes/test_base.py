@@ -3,7 +3,13 @@
 
 import pytest
 from helpers import MS
-from rclpy.qos import DurabilityPolicy, QoSCompatibility, ReliabilityPolicy, qos_check_compatible
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSCompatibility,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
 
 from ros_pad.bags import topics
 from ros_pad.nodes import qos
@@ -62,3 +68,7 @@ def test_both_ends_of_each_topic_match_and_what_must_arrive_is_reliable(topic):
     reliable = ends.subscribe.reliability == ReliabilityPolicy.RELIABLE
     assert reliable == (topic in certain or topic.text)
     assert (ends.publish.durability == DurabilityPolicy.TRANSIENT_LOCAL) == topic.text
+    for wanted in (False, True):  # a recorder may ask for repetition
+        profile = qos.recording(topic, wanted)
+        assert profile.history == HistoryPolicy.KEEP_ALL
+        assert (profile.reliability == ReliabilityPolicy.RELIABLE) == (reliable or wanted)

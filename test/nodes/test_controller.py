@@ -136,19 +136,6 @@ def test_a_row_that_lacks_something_concerns_its_leg_only(robot, case):
     assert (robot.step(0.5) > 0.0).all()
 
 
-def test_values_that_are_missing_do_not_count_as_a_step(robot):
-    """A foot must not switch while it stands."""
-    node = robot.start()
-    for _ in range(3):
-        robot.step(0.5)
-    robot.estimate(wetness=0.98)
-    switches = dict(node.controller.switches)
-    for fields in LOST.values():
-        robot.estimate(**({'wetness': 0.98} | fields))
-        assert robot.estimate(wetness=0.98)['setpoint'].tolist() == [0.0, 0.0]
-    assert node.controller.switches == switches
-
-
 def test_a_pressure_that_does_not_follow_is_a_fault_of_its_leg(robot):
     robot.start(policy='dome', dome_pressure=60e3)
     for _ in range(100):

@@ -160,15 +160,6 @@ def test_what_has_arrived_is_written_at_the_end(context, robot, record, until, t
     assert BagReader(tmp_path / 'trial').counts['/feet/estimate'] > 0
 
 
-def test_what_was_latched_before_is_recorded(robot, record, until, tmp_path):
-    qos.publisher(robot, topics.BODY_DOUBT).publish(String(data='slips'))
-    recorder = record()
-    until(lambda: recorder.message_count)
-    recorder.close()
-    ((topic, message, _),) = BagReader(tmp_path / 'trial').messages()
-    assert (topic, message.data) == ('/body/doubt', 'slips')
-
-
 def on_disk(folder, topic):
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
@@ -268,26 +259,6 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     )  # fmt: skip
     assert statuses[0].message == f'too slow: {value.value} messages lost so far'
     assert (value.key, 0 < int(value.value) <= lost[1]) == ('/body/pose', True)
-
-
-@pytest.mark.parametrize('reliable', [False, True])
-def test_measurements_are_repeated_only_where_that_is_wanted(robot, record, until, reliable):
-    """Commands, states and diagnostics are reliable in any case."""
-
-    def asked(name):
-        peers = robot.get_subscriptions_info_by_topic(name)
-        return [peer.qos_profile.reliability for peer in peers]
-
-    node = record(**({'reliable': True} if reliable else {}))
-    measured = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
-    certain = (topics.COMMAND, topics.BODY_DOUBT, topics.DIAGNOSTICS)
-    for topic in topics.RECORDED:
-        name = f'/{topic.name().lstrip("/")}'
-        until(lambda name=name: asked(name), what=name)
-        if topic is not topics.CLOCK:
-            wanted = ReliabilityPolicy.RELIABLE if topic in certain else measured
-            assert asked(name) == [wanted], name
-    node.close()
 
 
 def test_simulated_time_is_that_of_stamps_and_of_the_clock(robot, record, until, tmp_path):
