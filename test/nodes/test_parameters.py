@@ -252,7 +252,11 @@ def test_what_is_not_allowed_is_named(declared, parameter, given, allowed):
     ],
 )
 def test_a_bad_value_ends_the_node_with_one_line(name, given, message, capfd):
-    assert run(node_class(name), [name, '--ros-args', '-p', given]) == 2
+    def make():
+        node_class(name)().destroy_node()
+        pytest.fail('the node accepts it')
+
+    assert run(make, [name, '--ros-args', '-p', given]) == 2
     errors = capfd.readouterr().err
     assert errors.startswith(f'ros_pad: {message}'), errors
     assert errors.count('\n') == 1

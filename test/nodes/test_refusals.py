@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages that cannot be read are counted and reported, and the node goes on."""
 
-
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from helpers import MS, command, encoded, estimate, sample
