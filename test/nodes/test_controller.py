@@ -84,6 +84,12 @@ def test_dome_on_wet_ground_and_flat_again_on_dry(robot):
     assert (domes[0], max(domes), domes[-1]) == (0.0, 1.0, 0.0)
 
 
+def test_a_changed_policy_decides_from_then_on(robot):
+    robot.start(policy='adaptive')
+    assert robot.bench.set('policy.wet_above', 1.0).successful
+    assert not any(robot.step(0.98)[0] > 0.0 for _ in range(8))
+
+
 def test_a_fixed_pressure_is_taken_as_it_is(robot):
     robot.start(policy='dome', dome_pressure=40e3)
     assert robot.estimate().tolist() == [(1.0, 40e3), (1.0, 40e3)]
