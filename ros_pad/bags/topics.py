@@ -172,6 +172,9 @@ MARKERS = Topic('markers', 'visualization_msgs/msg/MarkerArray', 'm')
 FEET_MARKERS = Topic('feet/markers', 'visualization_msgs/msg/MarkerArray', 'm')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's', values=('clock.sec', 'clock.nanosec'))
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
+TF = Topic('/tf', 'tf2_msgs/msg/TFMessage', 'm', 'odom')
+PARAMETERS = Topic('parameters', 'std_msgs/msg/String', values=('data',), text=True)
+"""Values of the parameters of a node as JSON, from each node; for the custom data of a bag."""
 
 RECORDED = (
     *(CLOCK, *RECORDS, BODY_POSE, IMU, JOINT_STATES),

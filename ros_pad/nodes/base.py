@@ -7,25 +7,28 @@ numbers differ: rclpy takes several times as long to convert whole messages.
 
 from __future__ import annotations
 
+import json
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message, serialize_message
 
 from ros_pad.bags import topics
 from ros_pad.bags.codec import field_getter, message_type, put_field
-from ros_pad.bags.topics import Topic
+from ros_pad.bags.topics import STAMP, Topic
 from ros_pad.bags.wire import Wire
 from ros_pad.nodes.parameters import Parameter, declare
-from ros_pad.nodes.qos import message_class, publisher, subscription
+from ros_pad.nodes.qos import publisher, subscription
 from ros_pad.pace import LATE, TICK_PERIOD_NS, Pace
 from ros_pad.records import Block, split
+from ros_pad.regulators.channel import Level
+
+_DIAGNOSTICS = message_type(topics.DIAGNOSTICS.type_name)
+_Status = type(_DIAGNOSTICS.blank('diagnostic_msgs/msg/DiagnosticStatus'))
+_KeyValue = type(_DIAGNOSTICS.blank('diagnostic_msgs/msg/KeyValue'))
 
 OLDEST = 0.1
 """Age of the last sample, s, from which a node that needs samples counts as late."""
@@ -62,12 +65,15 @@ class PadNode(Node):
         When a parameter is not allowed.
     """
 
-    OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+    OK, WARN, ERROR = Level.OK, Level.WARN, Level.ERROR
 
     def __init__(self, name: str, parameters: Sequence[Parameter], **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self.prepare()
         self.values = declare(self, parameters, self.permit, self.apply)
+        self._send_parameters = self.sender(topics.PARAMETERS, topics.PARAMETERS.values)
+        self._publish_parameters()
+        self.add_post_set_parameters_callback(self._publish_parameters)
         handle = self.get_clock().handle
         self.now_ns: Callable[[], int] = lambda: int(handle.get_now().nanoseconds)
         self.simulated: bool = self.get_parameter('use_sim_time').value
@@ -75,8 +81,9 @@ class PadNode(Node):
         self.reported: Any = None
         self._reason, self._quiet_until = '', 0.0  # of the last refusal
         self._record_ns = 0  # stamp of the last record that was processed
+        self._tick: Callable[[int], object] = lambda now_ns: None
         self._pace, self._since_ns, self._counted = Pace(1_000_000_000), self.now_ns(), 0
-        self._send_health = self.output(topics.DIAGNOSTICS)
+        self._send_health = self.sender(topics.DIAGNOSTICS, ('status',))
 
     def prepare(self) -> None:
         """Change what is given for the parameters, before they are declared."""
@@ -87,39 +94,36 @@ class PadNode(Node):
     def apply(self, values: Mapping[str, Any]) -> None:
         """Live by changed parameters, which nobody has refused."""
 
+    def _publish_parameters(self, changes: Sequence[object] = ()) -> None:
+        """Tell recorders the values of all parameters; who comes later hears of them, too."""
+        known = self.get_parameters(sorted(self.get_parameters_by_prefix('')))
+        told = {self.get_fully_qualified_name(): {each.name: each.value for each in known}}
+        self._send_parameters(json.dumps(told, default=list))
+
     # --- messages ------------------------------------------------------------------------------
-
-    def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
-        """Return a function that publishes whole messages, or their bytes."""
-        publish, of_type = publisher(self, topic, leg).publish, message_type(topic.type_name)
-
-        def send(message: Any) -> None:
-            if not isinstance(message, bytes):
-                # rclpy leaves what was in memory between numbers: a trial has the same bytes.
-                message = of_type.encode(of_type.decode(serialize_message(message)))
-            publish(message)
-
-        return send
 
     def sender(
         self,
         topic: Topic,
-        paths: Sequence[str],
+        paths: Sequence[str] = (),
         leg: int | None = None,
         constants: Mapping[str, Any] | None = None,
     ) -> Callable[..., None]:
-        """Return a function that sends a message with these numbers, in the order of `paths`.
+        """Return a function that sends a message with these values, in the order of `paths`.
 
-        The frame is that of the table of topics, other fields are zero.
+        Before them comes the time, ns, if the message has one. The frame is that of the table of
+        topics, other fields are zero or empty.
         """
         publish, of_type = publisher(self, topic, leg).publish, message_type(topic.type_name)
-        message = of_type.blank()
+        message, stamp = of_type.blank(), _stamp_of(topic)
         frame = {topics.FRAME: topic.frame.format(leg=leg)} if topic.frame else {}
         for path, value in (frame | dict(constants or {})).items():
             put_field(message, path, value)
 
-        def send(*values: float) -> None:
-            for path, value in zip(paths, values, strict=True):
+        def send(*values: Any) -> None:
+            if stamp:
+                values = (*split(values[0]), *values[1:])
+            for path, value in zip((*stamp, *paths), values, strict=True):
                 put_field(message, path, value)
             publish(of_type.encode(message))
 
@@ -147,13 +151,18 @@ class PadNode(Node):
         paths: Sequence[str] = (),
         leg: int | None = None,
     ) -> None:
-        """Call a function with some fields of each message; without paths, with the message."""
-        if paths:
-            get, decode = field_getter(paths), message_type(topic.type_name).decode
-            self._receive(topic, leg, decode, lambda message: callback(*get(message)))
-        else:
-            kind = message_class(topic.type_name)
-            self._receive(topic, leg, lambda data: deserialize_message(data, kind), callback)
+        """Call a function with the time, ns, and some fields of each message."""
+        get = field_getter((*_stamp_of(topic), *paths))
+
+        def take(message: Any) -> None:
+            seconds, fraction, *values = get(message)
+            callback(seconds * 1_000_000_000 + fraction, *values)
+
+        self._receive(topic, leg, message_type(topic.type_name).decode, take)
+
+    def receive_message(self, topic: Topic, callback: Callable[[Any], None]) -> None:
+        """Call a function with each message, whole."""
+        self._receive(topic, None, message_type(topic.type_name).decode, callback)
 
     def _receive(
         self,
@@ -185,39 +194,40 @@ class PadNode(Node):
 
     # --- time ----------------------------------------------------------------------------------
 
-    def every(self, period: float, callback: Callable[[], None]) -> None:
+    def every(self, period: float, callback: Callable[[], object]) -> None:
         """Call a function every so many seconds of a clock that no change of the time stops."""
         self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def on_tick(
         self,
-        callback: Callable[[int], None],
+        callback: Callable[[int], object],
         period: float = TICK_PERIOD_NS * 1e-9,
         all_steps: bool = False,
     ) -> None:
         """Call a function again and again with the node's time, ns.
 
         In real time a timer calls it every ``period`` seconds. In simulated time nodes live by the
-        stamps of records, see :meth:`advance`, and ``/clock`` calls it where no records come, or
-        at all steps.
+        stamps of records, see :meth:`advance`, and ``/clock`` calls it where no records come, once
+        in 0.1 s, or at all steps.
         """
+        pace = Pace(TICK_PERIOD_NS)
+        self._tick = lambda now_ns: callback(now_ns) if all_steps or pace.due(now_ns) else None
         if not self.simulated:
-            self.every(period, lambda: callback(self.now_ns()))
+            self.every(period, lambda: self._tick(self.now_ns()))
             return
 
-        def on_clock(seconds: int, fraction: int) -> None:
-            now_ns = seconds * 1_000_000_000 + fraction
+        def on_clock(now_ns: int) -> None:
             # Which of a record and the clock of its moment comes first must mean nothing.
             if all_steps or abs(now_ns - self._record_ns) > TICK_PERIOD_NS:
-                callback(now_ns)
+                self._tick(now_ns)
 
-        self.receive(topics.CLOCK, on_clock, topics.CLOCK.values)
+        self.receive(topics.CLOCK, on_clock)
 
-    def advance(self, stamp_ns: int, tick: Callable[[int], None]) -> None:
+    def advance(self, stamp_ns: int) -> None:
         """Process the stamp of a record, ns, which is a tick in simulated time."""
         if self.simulated:
             self._record_ns = stamp_ns
-            tick(stamp_ns)
+            self._tick(stamp_ns)
 
     # --- health --------------------------------------------------------------------------------
 
@@ -230,21 +240,22 @@ class PadNode(Node):
     def status(
         self,
         name: str,
-        level: bytes,
+        level: Level,
         message: str,
         values: Mapping[str, object] | None = None,
         part: str = '',
-    ) -> DiagnosticStatus:
+    ) -> Any:
         """Return a status of this node, with values by name, and the part that it is about."""
-        return DiagnosticStatus(
+        pairs = [_KeyValue(key=key, value=str(each)) for key, each in (values or {}).items()]
+        return _Status(
             name=f'{self.get_name()}: {name}',
             hardware_id=part,
             level=level,
             message=message,
-            values=[KeyValue(key=key, value=str(each)) for key, each in (values or {}).items()],
+            values=pairs,
         )
 
-    def rate(self, now_ns: int, samples: int, last_ns: int) -> list[DiagnosticStatus]:
+    def rate(self, now_ns: int, samples: int, last_ns: int) -> list[Any]:
         """Return rate and age of samples, of which so many have come; in real time only."""
         if self.simulated:
             return []
@@ -260,17 +271,17 @@ class PadNode(Node):
             return [self.status('rate', self.WARN, text, values)]
         return [self.status('rate', self.OK, f'{rate:.0f} samples a second', values)]
 
-    def report(self, now_ns: int, statuses: Sequence[DiagnosticStatus]) -> None:
+    def report(self, now_ns: int, statuses: Iterable[Any]) -> None:
         """Publish these on ``/diagnostics``, and which messages were refused."""
-        array = DiagnosticArray(status=list(statuses))
+        every = list(statuses)
         if self.refused:
-            array.status.append(
-                self.status('refused messages', self.WARN, self._reason, self.refused)
-            )
-        set_stamp(array.header.stamp, now_ns)
-        self._send_health(array)
+            every.append(self.status('refused messages', self.WARN, self._reason, self.refused))
+        self._send_health(now_ns, every)
 
 
-def set_stamp(stamp: Time, time_ns: int) -> None:
-    """Write a time in ns into a stamp; see :func:`ros_pad.records.split`."""
-    stamp.sec, stamp.nanosec = split(time_ns)
+def _stamp_of(topic: Topic) -> tuple[str, ...]:
+    """Return where messages of a topic have their time, as seconds and nanoseconds."""
+    if topic is topics.CLOCK:
+        return topic.values
+    fields = dict(message_type(topic.type_name).fields(topic.type_name))
+    return STAMP if 'header' in fields else ()

@@ -8,25 +8,21 @@ why the motion must not be relied on is published on ``body/doubt`` and on ``/di
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import TransformStamped
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 
 from ros_pad.bags import topics
-from ros_pad.bags.topics import STAMP
+from ros_pad.bags.codec import message_type, put_field
+from ros_pad.bags.topics import FRAME, STAMP
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.nodes import qos
-from ros_pad.nodes.base import PadNode, set_stamp
+from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import LEGS, Parameter
-from ros_pad.nodes.process import run
 from ros_pad.nodes.qos import message_class
-from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace
+from ros_pad.pace import CONTROL_PERIOD_NS, Pace
 from ros_pad.records import SAMPLE, Block, split
 from ros_pad.sensing import BodyEstimate, SensingStage
 from ros_pad.sensing.mapping import Mapping
@@ -68,6 +64,11 @@ PARAMETERS = (
 )
 
 _ABSENT = ('angular_velocity_covariance[0]', 'linear_acceleration_covariance[0]')
+_TRANSFORM = 'geometry_msgs/msg/TransformStamped'
+_POSE = (
+    *(f'transform.translation.{axis}' for axis in 'xyz'),
+    *(f'transform.rotation.{axis}' for axis in 'xyzw'),
+)
 _TWIST = [f'twist.{part}.{axis}' for part in ('linear', 'angular') for axis in 'xyz']
 
 
@@ -143,38 +144,22 @@ class BodyEstimatorNode(PadNode):
         )
         self._standard = Mapping.load('default', robot)
         self._samples = _Samples(self.record_output(topics.SAMPLE, legs), len(legs))
-        self._doubts = self.output(topics.BODY_DOUBT)
-        self._advertise(values['base_frame'], values['publish_tf'])
+        self._doubts = self.sender(topics.BODY_DOUBT, topics.BODY_DOUBT.values)
+        twist = (*(f'twist.{each}' for each in _TWIST), 'twist.covariance')
+        paths = (*topics.ODOM.values, 'pose.covariance', *twist)
+        base = {'child_frame_id': values['base_frame']}
+        self._send_odom = self.sender(topics.ODOM, paths, constants=base)
+        self._transform = message_type(topics.TF.type_name).blank(_TRANSFORM)
+        for path, value in (base | {FRAME: topics.TF.frame}).items():
+            put_field(self._transform, path, value)
+        self._send_tf = self.sender(topics.TF, ('transforms',)) if values['publish_tf'] else None
         if mapping:
             self._follow(mapping)
         else:
             self.receive_record(topics.FORCE, legs, self._on_forces)
-            self.receive(topics.IMU, self._on_imu, (*STAMP, *_ABSENT, *topics.IMU.values))
-            self.receive(topics.JOINT_STATES, self._on_joints)
-        self._health_pace = Pace(TICK_PERIOD_NS)
-        self.on_tick(self._tick)
-
-    def _advertise(self, base: str, publish_tf: bool) -> None:
-        """Create the publishers of odom and of the transform from odom to the base."""
-        twist = (*(f'twist.{each}' for each in _TWIST), 'twist.covariance')
-        paths = (*STAMP, *topics.ODOM.values, 'pose.covariance', *twist)
-        self._send_odom = self.sender(topics.ODOM, paths, constants={'child_frame_id': base})
-        self._send_tf: Callable[[int, BodyEstimate], None] | None = None
-        if not publish_tf:
-            return
-        kind = message_class('tf2_msgs/msg/TFMessage')
-        publisher = self.create_publisher(kind, '/tf', qos.RELIABLE)
-
-        def send(stamp_ns: int, estimate: BodyEstimate) -> None:
-            transform = TransformStamped(child_frame_id=base)
-            transform.header.frame_id = topics.ODOM.frame
-            set_stamp(transform.header.stamp, stamp_ns)
-            place, turn = transform.transform.translation, transform.transform.rotation
-            place.x, place.y, place.z = estimate.position.tolist()
-            turn.x, turn.y, turn.z, turn.w = estimate.orientation.tolist()
-            publisher.publish(kind(transforms=[transform]))
-
-        self._send_tf = send
+            self.receive(topics.IMU, self._on_imu, (*_ABSENT, *topics.IMU.values))
+            self.receive_message(topics.JOINT_STATES, self._on_joints)
+        self.on_tick(self._look)
 
     def _follow(self, mapping: Mapping) -> None:
         """Subscribe to the topics of a mapping."""
@@ -195,7 +180,7 @@ class BodyEstimatorNode(PadNode):
             self.create_subscription(kind, source.topic, callback, qos.SENSOR)
 
     def _on_forces(self, block: Block) -> None:
-        self.advance(block.last_ns, self._tick)
+        self.advance(block.last_ns)
         for stamp_ns, rows in zip(block.stamps.tolist(), block.rows['force'], strict=True):
             for index, force in enumerate(rows):
                 if np.isfinite(force).all():
@@ -203,19 +188,18 @@ class BodyEstimatorNode(PadNode):
         self._samples.settle('forces', block.last_ns, self.simulated)
 
     def _on_imu(
-        self, sec: int, nanosec: int, no_gyro: float, no_accelerometer: float, *values: float
+        self, stamp_ns: int, no_gyro: float, no_accelerometer: float, *values: float
     ) -> None:
         if -1.0 in (no_gyro, no_accelerometer):  # as the message defines it
             name = 'angular_velocity' if no_gyro == -1.0 else 'linear_acceleration'
             self.stage.reject(InvalidInput(f'{name}_covariance[0] = -1: the IMU must measure it'))
             return
-        stamp_ns = sec * 1_000_000_000 + nanosec
         if math.isfinite(sum(values)):
             self._rate = np.array(values[:3])
             self.stage.imu(stamp_ns, values[:3], values[3:])
         self._samples.settle('imu', stamp_ns, self.simulated)
 
-    def _on_joints(self, message: JointState) -> None:
+    def _on_joints(self, message: Any) -> None:
         try:
             readings = self._standard.read('joint_states', message, 0)
         except InvalidInput as error:
@@ -227,24 +211,25 @@ class BodyEstimatorNode(PadNode):
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         """Publish an estimate of the body, and collect what it shows of the feet."""
         estimate = estimate._replace(doubt=estimate.doubt or self._lasting)
-        values = [*split(stamp_ns), *estimate.position.tolist(), *estimate.orientation.tolist()]
+        pose = [*estimate.position.tolist(), *estimate.orientation.tolist()]
         rate = self._robot.imu[:3, :3] @ self._rate
         velocity, covariance = twist_of(estimate, rate, self.values['gyro_noise'])
         matrices = estimate.covariance[:6, :6].ravel(), covariance.ravel()
-        self._send_odom(*values, matrices[0], *velocity.tolist(), matrices[1])
+        self._send_odom(stamp_ns, *pose, matrices[0], *velocity.tolist(), matrices[1])
         if self._send_tf:
-            self._send_tf(stamp_ns, estimate)
+            for path, value in zip((*STAMP, *_POSE), (*split(stamp_ns), *pose), strict=True):
+                put_field(self._transform, path, value)
+            self._send_tf([self._transform])
         self._samples.add(stamp_ns, sample_of(estimate))
 
     def _publish_doubt(self, doubt: str) -> None:
-        self._doubts(String(data=doubt or self._lasting))
+        self._doubts(doubt or self._lasting)
 
     def _warn(self, error: InvalidInput) -> None:
         self.get_logger().warning(f'reading ignored: {error}', throttle_duration_sec=1.0)
 
-    def _tick(self, now_ns: int) -> None:
-        if not self._health_pace.due(now_ns):
-            return
+    def _look(self, now_ns: int) -> None:
+        """Look for silent sensors, and report on the motion."""
         stage = self.stage
         stage.tick(now_ns)
         if not self.due(now_ns, (stage.doubt or '').partition(':')[0]):
@@ -259,7 +244,3 @@ class BodyEstimatorNode(PadNode):
         }
         status = self.status('sensing', level, text, values, self._robot.name)
         self.report(now_ns, [status, *self.rate(now_ns, stage.samples, stage.last_ns)])
-
-
-if __name__ == '__main__':
-    sys.exit(run(BodyEstimatorNode))

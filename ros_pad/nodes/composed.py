@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import copy
 import gc
-import itertools
-import json
 import os
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -33,7 +32,7 @@ from ros_pad.estimation import Tuning
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
-from ros_pad.nodes.parameters import BACKEND_OPTIONS, values_of
+from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
@@ -42,7 +41,7 @@ from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.label import PARAMETERS, label, note
+from ros_pad.trials.label import label, note
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.metrics import summarise
 from ros_pad.trials.node_settings import body_settings_for, tuning_for
@@ -114,8 +113,6 @@ class ComposedTrial:
         try:
             tuning = tuning or tuning_for(scene, sensing)
             self._add_nodes(policy, seed, bag, fidelity, sensing, tuning)
-            parameters = {each.get_fully_qualified_name(): values_of(each) for each in self._nodes}
-            self.recorder.describe({PARAMETERS: json.dumps(parameters)})
             # The executor adds nodes only while it spins; messages that were published before
             # that would arrive in another order.
             self.executor.spin_once(timeout_sec=0.01)
@@ -147,8 +144,8 @@ class ComposedTrial:
         tuning: Tuning,
     ) -> None:
         """Make the nodes: the recorder first; last the simulator, which starts the trial."""
-        scene, joints = self.scene, sensing == 'joints'
-        foot, ground = scene.foot.source, {'scene': scene.source, 'seed': seed}
+        scene, foot = self.scene, self.scene.foot.source
+        ground = {'scene': scene.source, 'seed': seed}
         timed = {'use_sim_time': True, 'legs': list(scene.legs)}
         loaded = timed | {'foot': foot, 'expected_load': scene.expected_load}
         about = label(scene, policy, seed, fidelity, sensing=sensing)
@@ -157,26 +154,21 @@ class ComposedTrial:
         # differ from its file.
         options = scene.regulator_options.items()
         own = {f'{BACKEND_OPTIONS}.{key}': value for key, value in options}
-        self.regulator = self._add(
-            RegulatorNode, ceiling=scene.foot.ceiling, foot=foot, **timed, **own
-        )
+        own['ceiling'] = scene.foot.ceiling
+        self.regulator = self._add(RegulatorNode, foot=foot, **timed, **own)
         self.body_estimator = None
-        if joints:
+        if sensing == 'joints':
             assert isinstance(scene.body, LeggedBody)
-            own = body_settings_for(scene) | {'robot': scene.body.robot.source}
-            # Its soles are on ankles.
-            self.body_estimator = self._add(BodyEstimatorNode, foot_radius=0.0, **timed, **own)
+            # The soles of simulated robots are on ankles.
+            own = {'robot': scene.body.robot.source, 'foot_radius': 0.0}
+            own |= body_settings_for(scene)
+            self.body_estimator = self._add(BodyEstimatorNode, **timed, **own)
         self.estimator = self._add(EstimatorNode, **tuning.values, **loaded)
-        own = ground if policy == 'oracle' else {}
-        self.controller = self._add(
-            ControllerNode,
-            policy=policy,
-            dome_pressure=scene.dome_pressure or 0.0,
-            **loaded,
-            **own,
-        )
-        own = {'fidelity': fidelity, 'sensing': sensing, 'publish_clock': True}
-        self.simulator = self._add(SimulatorNode, foot=foot, free_running=False, **own, **ground)
+        own = {'policy': policy, 'dome_pressure': scene.dome_pressure or 0.0}
+        own |= ground if policy == 'oracle' else {}
+        self.controller = self._add(ControllerNode, **own, **loaded)
+        own = {'fidelity': fidelity, 'sensing': sensing, 'publish_clock': True, 'foot': foot}
+        self.simulator = self._add(partial(SimulatorNode, False), **own, **ground)
 
     def _discover(self) -> None:
         deadline = time.monotonic() + PATIENCE
@@ -190,17 +182,13 @@ class ComposedTrial:
 
     def _connected(self) -> bool:
         """Return whether every publisher and subscription here has found its counterparts."""
-        publishers = [publisher for node in self._nodes for publisher in node.publishers]
+        publishers = [each for node in self._nodes for each in node.publishers]
         subscriptions = [each for node in self._nodes for each in node.subscriptions]
-        for publisher in publishers:
-            name = publisher.topic_name
-            sinks = [each for each in subscriptions if each.topic_name == name]
-            if publisher.get_subscription_count() < len(sinks):
-                return False
-            sources = [each for each in publishers if each.topic_name == name]
-            if any(each.get_publisher_count() < len(sources) for each in sinks):
-                return False
-        return True
+        sources = Counter(each.topic_name for each in publishers)
+        sinks = Counter(each.topic_name for each in subscriptions)
+        return all(
+            each.get_subscription_count() >= sinks[each.topic_name] for each in publishers
+        ) and all(each.get_publisher_count() >= sources[each.topic_name] for each in subscriptions)
 
     def _lock_step(self, step: Callable[[], bool], what: str) -> None:
         """Call a function, and again whenever its step was answered, until there is no answer.
@@ -212,32 +200,27 @@ class ComposedTrial:
         PadError
             When an answer takes more than ``PATIENCE``.
         """
-        self._failure: BaseException | None = None
-        done, answers = Future(), itertools.count()
+        simulator, done = self.simulator, Future()
 
         def go_on() -> None:
-            next(answers)
             try:
-                if step():
-                    return
+                if not step():
+                    done.set_result(None)
             except BaseException as error:  # the executor would end with a traceback
-                self._failure = error
-            done.set_result(None)
+                done.set_exception(error)
 
-        self.simulator.answered = go_on
+        simulator.answered = go_on
         go_on()
-        seen = 0
         while not done.done():
+            before_ns = simulator.time_ns
             self.executor.spin_until_future_complete(done, timeout_sec=PATIENCE)
-            before, seen = seen, next(answers)
-            if not done.done() and seen == before + 1:
+            if not done.done() and simulator.time_ns == before_ns:
                 raise PadError(
                     f'waited more than {PATIENCE:g} s of wall time for {what} at'
-                    f' {self.simulator.time_ns * 1e-9:.3f} s: pad doctor checks ROS 2'
+                    f' {simulator.time_ns * 1e-9:.3f} s: pad doctor checks ROS 2'
                 )
-        self.simulator.answered = lambda: None
-        if self._failure:
-            raise self._failure
+        simulator.answered = lambda: None
+        done.result()
 
     def walk(self, progress: Progress | None = None) -> None:
         """Walk the scene to its end, to a verdict or until ``stopped`` is set; then vent the pads.
@@ -307,29 +290,6 @@ class ComposedTrial:
             self.executor.shutdown()
 
 
-def _walked(
-    make: Callable[[], ComposedTrial],
-    describe: Callable[..., dict[str, str]],
-    progress: Progress | None,
-) -> tuple[ComposedTrial, float]:
-    """Walk and close the nodes; return them, and the wall time of the walk, s."""
-    with STOP.during():  # no signal leaves half a trial
-        trial = make()
-        started = time.perf_counter()
-        # The first Ctrl-C or SIGTERM stops the walk; further ones disturb nothing.
-        with STOP.during(partial(setattr, trial, 'stopped', True)):
-            try:
-                trial.walk(progress)
-            except BaseException:
-                with suppress(PadError):  # a bag on a full disk cannot be closed either
-                    trial.close()
-                raise
-            wall = time.perf_counter() - started
-            trial.recorder.describe(describe(interrupted=trial.stopped))
-            trial.close()
-    return trial, wall
-
-
 def run(
     scene: Scene | str | os.PathLike[str],
     policy: str | None = None,
@@ -370,16 +330,28 @@ def run(
     level = levels.level(scene, fidelity, policy, sensing == 'joints')
     describe = partial(label, scene, policy, seed, level, sensing=sensing)
     context = rclpy.Context()
-    make = partial(ComposedTrial, scene, policy, seed, bag, context, level, sensing, tuning)
-    # rclpy's own signal handlers would stop the nodes before the pads are vented.
     try:
+        # rclpy's own signal handlers would stop the nodes before the pads are vented.
         rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise PadError(f'ROS 2 does not start: {error}: pad doctor finds the cause') from error
     try:
-        trial, wall = _walked(make, describe, progress)
+        with STOP.during():  # no signal leaves half a trial
+            trial = ComposedTrial(scene, policy, seed, bag, context, level, sensing, tuning)
+            started = time.perf_counter()
+            try:
+                # The first Ctrl-C or SIGTERM stops the walk; further ones disturb nothing.
+                with STOP.during(partial(setattr, trial, 'stopped', True)):
+                    trial.walk(progress)
+                wall = time.perf_counter() - started
+                trial.recorder.describe(describe(interrupted=trial.stopped))
+            except BaseException:
+                with suppress(PadError):  # a bag on a full disk cannot be closed either
+                    trial.close()
+                raise
+            trial.close()
     finally:
-        rclpy.shutdown(context=context)
+        context.try_shutdown()
     robot, floor = trial.simulator.robot, trial.simulator.floor
     controller, shared = trial.walked, trial.estimator.stage.model.shared
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.

@@ -8,10 +8,7 @@ as text, with the health of the sensors.
 from __future__ import annotations
 
 import os
-import sys
 from typing import Any
-
-from diagnostic_msgs.msg import DiagnosticStatus
 
 from ros_pad.bags import topics
 from ros_pad.errors import InvalidInput, PadError
@@ -20,8 +17,7 @@ from ros_pad.estimation import doubt as doubts
 from ros_pad.estimation.stage import PUBLISH_RATE, EstimationStage
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, Parameter
-from ros_pad.nodes.process import run
-from ros_pad.pace import TICK_PERIOD_NS, Pace
+from ros_pad.pace import Pace
 from ros_pad.records import Block
 from ros_pad.trials import learnt
 
@@ -65,13 +61,13 @@ class EstimatorNode(PadNode):
         )
         self._kept = learnt.settings_of(self.stage.model.shared)
         self._send = self.record_output(topics.ESTIMATE, self._legs)
-        self._keep_pace, self._health_pace = Pace(KEEP_PERIOD_NS), Pace(TICK_PERIOD_NS)
+        self._keep_pace = Pace(KEEP_PERIOD_NS)
         self.receive_record(topics.SAMPLE, self._legs, self._on_samples)
         self.receive_record(topics.PRESSURE, self._legs, self.stage.pressure)
-        self.on_tick(self._idle)
+        self.on_tick(self._look)
 
     def _on_samples(self, block: Block) -> None:
-        self.advance(block.last_ns, self._tick)
+        self.advance(block.last_ns)
         for estimate in self.stage.process(block):
             self._send(estimate)
 
@@ -108,28 +104,22 @@ class EstimatorNode(PadNode):
             self.keep_learnt()
         super().destroy_node()
 
-    def _idle(self, now_ns: int) -> None:
-        """Tick without samples: the controller has to know of a foot whose sensors are silent."""
-        before = self.reported
-        self._tick(now_ns)
-        if self.reported != before:
-            self._send(self.stage.estimate(now_ns))
-
-    def _tick(self, now_ns: int) -> None:
-        if not self._health_pace.due(now_ns):
-            return
+    def _look(self, now_ns: int) -> None:
+        """Look for silent sensors, and report on all of them."""
         self.stage.tick(now_ns)
         if self._keep_pace.due(now_ns):
             self.keep_learnt()
-        rows = self.stage.estimate(now_ns).rows[0]
+        estimate = self.stage.estimate(now_ns)
+        rows = estimate.rows[0]
         healthy = [not doubts.is_fault(code) for code in rows['doubt'].tolist()]
+        if healthy != self.reported and now_ns != self._record_ns:
+            self._send(estimate)  # no sample says it, and the controller has to know
         if self.due(now_ns, healthy):
-            numbers = range(len(rows))
-            feet = [self._foot(*each) for each in zip(numbers, rows, healthy, strict=True)]
+            feet = map(self._foot, range(len(rows)), rows, healthy)
             rate = self.rate(now_ns, self.stage.samples, self.stage.last_ns)
             self.report(now_ns, [*feet, self._learnt_status(), *rate])
 
-    def _foot(self, index: int, row: Any, healthy: bool) -> DiagnosticStatus:
+    def _foot(self, index: int, row: Any, healthy: bool) -> Any:
         """Return the health of the sensors of a foot, and its estimate, for ``/diagnostics``."""
         leg, noise = self._legs[index], self.stage.tracks[index].watch
         values = {
@@ -144,7 +134,7 @@ class EstimatorNode(PadNode):
         level = self.OK if healthy else self.ERROR
         return self.status(f'leg {leg} sensing', level, text, values, f'foot {leg}')
 
-    def _learnt_status(self) -> DiagnosticStatus:
+    def _learnt_status(self) -> Any:
         """Return the scales of friction with their intervals, for ``/diagnostics``."""
         values = {}
         for name, scale in self.stage.model.shared.scales.items():
@@ -152,7 +142,3 @@ class EstimatorNode(PadNode):
             values[name] = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
         text = 'friction over that of the contact model, with the interval of 95 %'
         return self.status('friction of the floor', self.OK, text, values, 'feet')
-
-
-if __name__ == '__main__':
-    sys.exit(run(EstimatorNode))

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Send or receive a message; ``pad doctor`` runs this in two processes to check DDS."""
+"""Send or receive a word; ``pad doctor`` runs this in two processes to check DDS."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from typing import Any
@@ -15,37 +14,31 @@ from std_msgs.msg import String
 PERIOD = 0.05  # s, from one message to the next
 
 
-def main() -> int:
-    """Publish a word repeatedly, or wait for it; return 0 if it was received here, else 1."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument('end', choices=('publisher', 'subscriber'))
-    parser.add_argument('topic')
-    parser.add_argument('word')
-    parser.add_argument('--seconds', type=float, default=10.0, help='longest run time, s')
-    options = parser.parse_args()
+def main(end: str, topic: str, word: str, seconds: str) -> int:
+    """Publish a word again and again, or wait for it as ``subscriber``; 0 if it was received."""
     rclpy.init()
     received: list[str] = []
+
+    def hear(message: Any) -> None:
+        received.append(message.data)
+
     try:
-        node = rclpy.create_node(f'ros_pad_doctor_{options.end}')
-        if options.end == 'publisher':
-            publisher = node.create_publisher(String, options.topic, 10)
-            node.create_timer(PERIOD, lambda: publisher.publish(String(data=options.word)))
+        node = rclpy.create_node(f'ros_pad_doctor_{end}')
+        if end == 'publisher':
+            publisher = node.create_publisher(String, topic, 10)
+            node.create_timer(PERIOD, lambda: publisher.publish(String(data=word)))
         else:
-
-            def receive(message: Any) -> None:
-                received.append(message.data)
-
-            node.create_subscription(String, options.topic, receive, 10)
+            node.create_subscription(String, topic, hear, 10)
         print('ready', flush=True)
-        end = time.monotonic() + options.seconds
-        while options.word not in received and time.monotonic() < end:
+        last = time.monotonic() + float(seconds)
+        while word not in received and time.monotonic() < last:
             rclpy.spin_once(node, timeout_sec=0.1)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
         rclpy.try_shutdown()
-    return 0 if options.word in received else 1
+    return 0 if word in received else 1
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))

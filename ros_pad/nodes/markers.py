@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import copy
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -18,13 +18,12 @@ from ros_pad.simulation.robot import FootState, SimulatedRobot
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
+# Classes of rclpy check each number, and take ten times as long.
 ARRAY = message_type('visualization_msgs/msg/MarkerArray')
-"""Type of the messages. Classes of rclpy check each number, and take ten times as long."""
 
-_MARKER = ARRAY.blank('visualization_msgs/msg/Marker')
-Marker, Header, Time = type(_MARKER), type(_MARKER.header), type(_MARKER.header.stamp)
-Pose, Point, Vector3 = type(_MARKER.pose), type(_MARKER.pose.position), type(_MARKER.scale)
-Quaternion, ColorRGBA = type(_MARKER.pose.orientation), type(_MARKER.color)
+_KIND = 'visualization_msgs/msg/Marker'
+_MARKER = ARRAY.blank(_KIND)
+_Point = type(_MARKER.pose.position)
 
 FORCE_SCALE = 0.01
 """Length of an arrow for one newton, m."""
@@ -64,8 +63,8 @@ class WalkMarkers:
         self._floor = floor
         self._slow_pace = Pace(_SLOW_NS)
 
-    def message(self, robot: SimulatedRobot, pressures: Sequence[float], time_ns: int) -> Any:
-        """Return the markers of this moment.
+    def message(self, robot: SimulatedRobot, pressures: Sequence[float], time_ns: int) -> bytes:
+        """Return the message of this moment, as bytes.
 
         Parameters
         ----------
@@ -76,40 +75,35 @@ class WalkMarkers:
         time_ns : int
             Time stamp of the markers, ns.
         """
-        seconds, nanoseconds = split(time_ns)
-        stamp = Time(sec=seconds, nanosec=nanoseconds)
-        array = ARRAY.blank()
+        markers = []
         for leg, foot, pressure in zip(robot.legs, robot.feet, pressures, strict=True):
-            array.markers.append(self._sole(leg, foot, pressure))
-            array.markers.append(self._force(leg, foot))
+            markers += [self._sole(leg, foot, pressure), self._force(leg, foot)]
         if self._slow_pace.due(time_ns):
-            array.markers.append(self._ground(*robot.body[:2]))
-        for marker in array.markers:
-            marker.header.stamp = stamp
-        return array
+            markers.append(self._ground(*robot.body[:2]))
+        return array_of(markers, time_ns, 'world')
 
     def _sole(self, leg: int, foot: FootState, pressure: float) -> Any:
         x, y, z = foot.position
-        marker = _marker('soles', leg, _MARKER.CYLINDER)
         height = 0.006 if pressure > DOME_PRESSURE else 0.002
-        ground = self._floor.height(x, y) if foot.standing else z
-        marker.pose.position = Point(x=x, y=y, z=ground + 0.5 * height)
+        if foot.standing:
+            z = self._floor.height(x, y)
         diameter = 2.0 * self._scene.foot.sole_radius
-        marker.scale = Vector3(x=diameter, y=diameter, z=height)
-        marker.color = _colour((_WET if foot.wet else _DRY) if foot.standing else _SWING)
+        colour = (_WET if foot.wet else _DRY) if foot.standing else _SWING
+        marker = _marker('soles', leg, _MARKER.CYLINDER, (diameter, diameter, height), colour)
+        _put(marker.pose.position, 'xyz', (x, y, z + 0.5 * height))
         return marker
 
     def _force(self, leg: int, foot: FootState) -> Any:
-        marker = _marker('forces', leg, _MARKER.ARROW)
         x, y, _ = foot.position
         fx, fy, fz = (FORCE_SCALE * each for each in foot.force)
+        sizes = 0.006, 0.012, 0.015  # of shaft and head, and length of the head
+        colour = _SLIPPING if foot.slip_speed > 0.005 else _BLACK
+        marker = _marker('forces', leg, _MARKER.ARROW, sizes, colour)
         if not foot.standing or not math.hypot(fx, fy, fz) > 0.0:
             marker.action = _MARKER.DELETE
             return marker
         z = self._floor.height(x, y)
-        marker.points = [Point(x=x, y=y, z=z), Point(x=x + fx, y=y + fy, z=z + fz)]
-        marker.scale = Vector3(x=0.006, y=0.012, z=0.015)  # shaft, head, length of head
-        marker.color = _colour(_SLIPPING if foot.slip_speed > 0.005 else _BLACK)
+        marker.points = [_Point(x=x, y=y, z=z), _Point(x=x + fx, y=y + fy, z=z + fz)]
         return marker
 
     def _ground(self, x: float, y: float) -> Any:
@@ -120,38 +114,56 @@ class WalkMarkers:
         ys = (first[1] + np.arange(rows) + 0.5) * CELL
         across, along = np.meshgrid(xs, ys)
         wet = self._floor.wet_along(across, along)
-        marker = _marker('wet ground', 0, _MARKER.CUBE_LIST)
+        marker = _marker('wet ground', 0, _MARKER.CUBE_LIST, (CELL, CELL, 0.001), _WET, 0.5)
         places = zip(across[wet].tolist(), along[wet].tolist(), strict=True)
-        marker.points = [Point(x=left, y=fore, z=0.0) for left, fore in places]
-        marker.scale = Vector3(x=CELL, y=CELL, z=0.001)
-        marker.color = _colour(_WET, 0.5)
+        marker.points = [_Point(x=left, y=fore, z=0.0) for left, fore in places]
         if not marker.points:
             marker.action = _MARKER.DELETE
         return marker
 
 
-def marker_of_foot(leg: int, x: float, y: float, wetness: float) -> Any:
-    """Return a foot at a place, m, in a colour from dry to wet by its P(wet); grey for NaN."""
-    marker = _marker('feet', leg, _MARKER.SPHERE)
-    marker.pose.position = Point(x=x, y=y, z=0.01)
-    marker.scale = Vector3(x=0.02, y=0.02, z=0.02)
+def marker_of_foot(leg: int, place: Sequence[float], wetness: float) -> Any:
+    """Return a foot at x, y, m, in a colour from dry to wet by its P(wet); grey for NaN."""
     share = min(max(wetness, 0.0), 1.0)
-    red, green, blue = (d + share * (w - d) for d, w in zip(_DRY, _WET, strict=True))
-    marker.color = _colour(_SWING if math.isnan(wetness) else (red, green, blue))
+    colour = tuple(d + share * (w - d) for d, w in zip(_DRY, _WET, strict=True))
+    colour = _SWING if math.isnan(wetness) else colour
+    marker = _marker('feet', leg, _MARKER.SPHERE, (0.02, 0.02, 0.02), colour)
+    _put(marker.pose.position, 'xyz', (*place, 0.01))
     return marker
 
 
-def _marker(name: str, number: int, kind: int) -> Any:
-    marker = copy.copy(_MARKER)
-    marker.ns, marker.id, marker.type = name, number, kind
-    marker.header = Header(stamp=Time(sec=0, nanosec=0), frame_id='world')
-    marker.pose = Pose(
-        position=Point(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
-    )
+def array_of(markers: Sequence[Any], time_ns: int, frame: str) -> bytes:
+    """Return the bytes of a message with markers of a time, ns, in a frame."""
+    array = ARRAY.blank()
+    array.markers = list(markers)
+    for marker in markers:
+        marker.header.frame_id = frame
+        _put(marker.header.stamp, ('sec', 'nanosec'), split(time_ns))
+    return ARRAY.encode(array)
+
+
+def _marker(
+    name: str,
+    number: int,
+    kind: int,
+    sizes: Sequence[float],
+    rgb: Sequence[float],
+    opacity: float = 1.0,
+) -> Any:
+    marker = _blank(name, number)  # encoded before it is filled again
+    marker.ns, marker.id, marker.type, marker.action = name, number, kind, _MARKER.ADD
+    marker.pose.orientation.w = 1.0
     marker.points = []
+    _put(marker.scale, 'xyz', sizes)
+    _put(marker.color, 'rgba', (*rgb, opacity))
     return marker
 
 
-def _colour(rgb: tuple[float, float, float], opacity: float = 1.0) -> Any:
-    red, green, blue = rgb
-    return ColorRGBA(r=red, g=green, b=blue, a=opacity)
+@functools.cache
+def _blank(name: str, number: int) -> Any:
+    return ARRAY.blank(_KIND)  # takes 0.1 ms
+
+
+def _put(part: Any, names: Sequence[str], values: Sequence[float]) -> None:
+    for name, value in zip(names, values, strict=True):
+        setattr(part, name, value)

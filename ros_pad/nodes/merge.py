@@ -9,7 +9,6 @@ record that somebody else publishes is not published here: two sources would con
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -18,13 +17,12 @@ from typing import Any
 import numpy as np
 
 from ros_pad.bags import topics
-from ros_pad.bags.topics import FRAME, STAMP, Topic
+from ros_pad.bags.topics import FRAME, Topic
 from ros_pad.errors import BadMessage
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.joining import WAIT_NS, Joiner
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
-from ros_pad.nodes.process import run
 from ros_pad.records import Block
 
 PARAMETERS = (
@@ -59,15 +57,12 @@ class MergeNode(PadNode):
         super().__init__('merge', PARAMETERS, **kwargs)
         legs, self.contested = self.values['legs'], Counter[str]()
         needed = ('force', 'position', 'velocity')[: 3 if self.values['source'] == 'joints' else 2]
-        self._joiners: dict[Topic, Joiner] = {}
-        for topic, fields in (
-            (topics.SAMPLE, needed),
-            (topics.FORCE, ('force',)),
-            (topics.PRESSURE, ()),
-            (topics.COMMAND, ()),
-        ):
-            assert topic.record
-            self._joiners[topic] = Joiner(topic.record, legs, fields)
+        pieces = {topics.SAMPLE: needed, topics.FORCE: ('force',)}
+        self._joiners = {
+            topic: Joiner(topic.record, legs, pieces.get(topic, ()))
+            for topic in (topics.SAMPLE, topics.FORCE, topics.PRESSURE, topics.COMMAND)
+            if topic.record
+        }
         # A publisher is made with the first record.
         self._outputs: dict[Topic, Callable[[Block], None]] = {}
         for topic in self.values['topics']:
@@ -76,18 +71,11 @@ class MergeNode(PadNode):
                 joined = next(each for each in topics.RECORDS if each.record is topic.record)
             for leg in legs:
                 take = partial(self._take, joined, topic, leg)
-                self.receive(topic, take, (FRAME, *STAMP, *topic.values), leg)
-        self.on_tick(self._tick, WAIT_NS * 1e-9, all_steps=True)
+                self.receive(topic, take, (FRAME, *topic.values), leg)
+        self.on_tick(self._on_time, WAIT_NS * 1e-9, all_steps=True)
 
     def _take(
-        self,
-        joined: Topic,
-        topic: Topic,
-        leg: int,
-        frame: str,
-        seconds: int,
-        fraction: int,
-        *values: float,
+        self, joined: Topic, topic: Topic, leg: int, stamp_ns: int, frame: str, *values: float
     ) -> None:
         """Process a message of a leg."""
         named = _OF_A_LEG.match(frame)
@@ -95,10 +83,9 @@ class MergeNode(PadNode):
             error = BadMessage(f'frame_id = {frame[:80]!r} is that of another leg')
             self.refuse(self.resolve_topic_name(topic.name(leg)), error)
             return
-        stamp_ns = seconds * 1_000_000_000 + fraction or self.now_ns()
         numbers = topics.to_record(topic, np.array(values), self.values['ambient_pressure'])
         piece = dict(zip(topic.columns, numbers.tolist(), strict=True))
-        self._send(joined, self._joiners[joined].add(leg, stamp_ns, piece))
+        self._send(joined, self._joiners[joined].add(leg, stamp_ns or self.now_ns(), piece))
 
     def _send(self, topic: Topic, blocks: list[Block]) -> None:
         for block in blocks:
@@ -114,14 +101,10 @@ class MergeNode(PadNode):
                 self._outputs[topic] = self.record_output(topic, self.values['legs'])
             self._outputs[topic](block)
 
-    def _tick(self, now_ns: int) -> None:
+    def _on_time(self, now_ns: int) -> None:
         for topic, joiner in self._joiners.items():
             self._send(topic, joiner.expire(now_ns))
         if self.due(now_ns) and (self.contested or self.refused):
             text = 'others publish records too: those of this node are refused'
             statuses = [self.status('records', self.ERROR, text, self.contested)]
             self.report(now_ns, statuses if self.contested else [])
-
-
-if __name__ == '__main__':
-    sys.exit(run(MergeNode))

@@ -58,15 +58,14 @@ class Parameter(Setting):
             additional_constraints=self.allowed,
             read_only=not self.live,
         )
-        bounded = math.isfinite(self.low) and math.isfinite(self.high)
-        if bounded and isinstance(self.default, float):
-            descriptor.floating_point_range = [
-                FloatingPointRange(from_value=float(self.low), to_value=float(self.high))
-            ]
-        elif bounded and isinstance(self.default, int):
-            descriptor.integer_range = [
-                IntegerRange(from_value=int(self.low), to_value=int(self.high))
-            ]
+        kind = self.value_type
+        if kind not in (int, float) or math.isinf(self.high - self.low):
+            return descriptor
+        bounds = {'from_value': kind(self.low), 'to_value': kind(self.high)}
+        if kind is float:
+            descriptor.floating_point_range = [FloatingPointRange(**bounds)]
+        else:
+            descriptor.integer_range = [IntegerRange(**bounds)]
         return descriptor
 
 
@@ -116,9 +115,8 @@ def declare(
         When a value is not allowed, or a name looks misspelt. The message names node, parameter,
         value and what is allowed.
     """
-    values = {}
-    for parameter in table:
-        name = parameter.name
+    known, values = {parameter.name: parameter for parameter in table}, {}
+    for name, parameter in known.items():
         # ROS's own messages for a wrong type or range name neither node nor unit: accept any
         # value here, and check it below.
         if not node.has_parameter(name):
@@ -132,27 +130,25 @@ def declare(
         except ConfigError as error:
             raise ConfigError(f'node {node.get_name()}: {error}') from error
         node.declare_parameter(name, value, parameter.descriptor(), ignore_override=True)
-    _refuse_misspelt(node, [parameter.name for parameter in table])
-    live = {parameter.name: parameter for parameter in table if parameter.live}
+    _refuse_misspelt(node, list(known))
     simulated = node.get_parameter('use_sim_time').value
+
+    def read(changes: list[RosParameter]) -> dict[str, Any]:
+        return {
+            each.name: _checked(known[each.name], each.value)[1]
+            for each in changes
+            if each.name in known
+        }
 
     def check(changes: list[RosParameter]) -> SetParametersResult:
         try:
             if any(each.name == 'use_sim_time' and each.value != simulated for each in changes):
                 # A node that waits for a missing /clock would not vent.
                 raise ConfigError('parameter use_sim_time is read only at the start of the node')
-            if changed := read(changes):
-                permit(values | changed)
+            permit(values | read(changes))
         except PadError as error:
             return SetParametersResult(reason=f'node {node.get_name()}: {error}')
         return SetParametersResult(successful=True)
-
-    def read(changes: list[RosParameter]) -> dict[str, Any]:
-        return {
-            each.name: _checked(live[each.name], each.value)[1]
-            for each in changes
-            if each.name in live
-        }
 
     def follow(changes: list[RosParameter]) -> None:
         if changed := read(changes):
@@ -170,14 +166,13 @@ def _refuse_misspelt(node: Node, known: Sequence[str]) -> None:
         head = name.split('.')[0]
         if name in known or head in (*_OF_ROS, BACKEND_OPTIONS):
             continue
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
-        near = near or difflib.get_close_matches(head, [*known, BACKEND_OPTIONS], n=1, cutoff=0.75)
-        if near:
-            # A misspelt limit must not be ignored.
-            raise ConfigError(
-                f'node {node.get_name()}: there is no parameter {name!r}.'
-                f' Did you mean {near[0]!r}?'
-            )
+        for given, names in ((name, known), (head, [*known, BACKEND_OPTIONS])):
+            for near in difflib.get_close_matches(given, names, n=1, cutoff=0.75):
+                # A misspelt limit must not be ignored.
+                raise ConfigError(
+                    f'node {node.get_name()}: there is no parameter {name!r}.'
+                    f' Did you mean {near!r}?'
+                )
         if '.' not in name:
             node.get_logger().warning(f'there is no parameter {name!r}: it is ignored')
 
@@ -196,18 +191,8 @@ def _checked(parameter: Parameter, given: Any) -> tuple[Any, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return the value of a parameter in a form that JSON can express."""
-    if isinstance(value, array):
-        return value.tolist()
-    if isinstance(value, list) and value and isinstance(value[0], bytes):
-        return list(b''.join(value))
-    return value
-
-
-def values_of(node: Node) -> dict[str, Any]:
-    """Return every parameter of a node by name, in a form that JSON can express."""
-    names = sorted(node.get_parameters_by_prefix(''))
-    return {each.name: plain(each.value) for each in node.get_parameters(names)}
+    """Return the value of a parameter, an array as a list."""
+    return value.tolist() if isinstance(value, array) else value
 
 
 def chosen(known: Sequence[Topic]) -> Callable[[str], list[Topic]]:

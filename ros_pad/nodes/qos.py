@@ -38,6 +38,11 @@ STATE = QoSProfile(
 )  # fmt: skip
 """Latched state such as the morphology: a late subscriber receives the last one."""
 
+STATES = QoSProfile(
+    depth=100, reliability=_RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)  # fmt: skip
+"""Subscribe to the latched states of several publishers."""
+
 CLOCK = QoSProfile(depth=1, reliability=_BEST_EFFORT)
 """Subscribe to ``/clock``, as rclpy itself does."""
 
@@ -58,15 +63,14 @@ _OF = {
     topics.LEG_SETPOINT.pattern: Profiles(NEWEST, NEWEST),
     topics.CLOCK.pattern: Profiles(NEWEST, CLOCK),
     topics.DIAGNOSTICS.pattern: Profiles(RELIABLE, RELIABLE),
+    topics.PARAMETERS.pattern: Profiles(STATE, STATES),
 }
 
 
 def profiles(topic: Topic) -> Profiles:
     """Return the QoS of a topic."""
-    if topic.text:
-        return Profiles(STATE, STATE)
-    measured = Profiles(RELIABLE, RECORDS if topic in topics.RECORDS else SENSOR)
-    return _OF.get(topic.pattern, measured)
+    usual = Profiles(RELIABLE, RECORDS if topic in topics.RECORDS else SENSOR)
+    return _OF.get(topic.pattern, Profiles(STATE, STATE) if topic.text else usual)
 
 
 def publisher(node: Node, topic: Topic, leg: int | None = None) -> Publisher:
@@ -104,23 +108,17 @@ def recording(topic: Topic, reliable: bool) -> QoSProfile:
 
 def offered(topic: Topic) -> str:
     """Return what publishers of a topic offer, as YAML text, in the form of bags of ROS 2."""
-    profile, infinite = profiles(topic).publish, {'sec': 9223372036, 'nsec': 854775807}
-    return yaml.safe_dump(
-        [
-            {
-                'history': profile.history.name.lower(),
-                'depth': profile.depth,
-                'reliability': profile.reliability.name.lower(),
-                'durability': profile.durability.name.lower(),
-                'deadline': dict(infinite),
-                'lifespan': dict(infinite),
-                'liveliness': 'automatic',
-                'liveliness_lease_duration': dict(infinite),
-                'avoid_ros_namespace_conventions': False,
-            }
-        ],
-        sort_keys=False,
-    )
+    profile = profiles(topic).publish
+    policies = {
+        name: getattr(profile, name).name.lower()
+        for name in ('history', 'reliability', 'durability')
+    }
+    times = {
+        name: {'sec': 9223372036, 'nsec': 854775807}  # no limit
+        for name in ('deadline', 'lifespan', 'liveliness_lease_duration')
+    }
+    others = {'liveliness': 'automatic', 'avoid_ros_namespace_conventions': False}
+    return yaml.safe_dump([{**policies, 'depth': profile.depth, **times, **others}])
 
 
 @functools.cache

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import fields
@@ -15,20 +14,17 @@ from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
 from ros_pad.bags import topics
-from ros_pad.contact.resistance import Foot
 from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.errors import ConfigError
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import BACKEND_OPTIONS, FOOT, LEGS, Parameter, plain
-from ros_pad.nodes.process import run
 from ros_pad.pace import TICK_PERIOD_NS, Pace
 from ros_pad.records import Block
 from ros_pad.regulators import BACKENDS, create
 from ros_pad.regulators.channel import (
     CEILING_TOLERANCE,
     ON_FAULT,
-    Health,
     SupervisedChannel,
     SupervisorSettings,
 )
@@ -93,18 +89,29 @@ class RegulatorNode(PadNode, LifecycleNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('regulator', PARAMETERS, **kwargs)
-        self._check_parameters()
         values, legs = self.values, self.values['legs']
+        backend, foot = values['backend'], values['foot']
+        if self.simulated and backend != 'simulated':
+            raise ConfigError(
+                f'node {self.get_name()}: parameter use_sim_time = True is not allowed with'
+                f' backend {backend}: if /clock stops, its pads stay under pressure'
+            )
+        if values['ceiling'] > foot.ceiling:
+            raise ConfigError(
+                f'node {self.get_name()}: parameter ceiling = {values["ceiling"]:g} Pa is'
+                f' not allowed: the ceiling of foot {foot.source} is {foot.ceiling:g} Pa'
+            )
         self._read_pace = Pace(round(1e9 / values['publish_rate']))
         self._check_pace = Pace(TICK_PERIOD_NS)
         self.tick_ns = 0
-        self._elapsed_ns = 0  # the same on the clock that measures the age of commands
         self._problem: Exception | None = None  # why the last configuration failed
         self._send = self.record_output(topics.PRESSURE, legs)
         self.receive_record(topics.COMMAND, legs, self._on_command)
         self.create_service(Trigger, '~/vent', self._on_vent)
         self.add_on_set_parameters_callback(self._check_options)
-        self.on_tick(self._tick, min(LONGEST_TICK, 0.5 / values['publish_rate']), all_steps=True)
+        self.on_tick(
+            self._on_time, min(LONGEST_TICK, 0.5 / values['publish_rate']), all_steps=True
+        )
         self._starting: bool = values['autostart']
         if self._starting:
             self.trigger_configure()
@@ -112,20 +119,6 @@ class RegulatorNode(PadNode, LifecycleNode):
                 raise self._problem
             self.trigger_activate()
             self._starting = False
-
-    def _check_parameters(self) -> None:
-        """Refuse values that are not allowed together."""
-        backend, foot = self.values['backend'], self.values['foot']
-        if self.simulated and backend != 'simulated':
-            raise ConfigError(
-                f'node {self.get_name()}: parameter use_sim_time = True is not allowed with'
-                f' backend {backend}: if /clock stops, its pads stay under pressure'
-            )
-        if self.values['ceiling'] > foot.ceiling:
-            raise ConfigError(
-                f'node {self.get_name()}: parameter ceiling = {self.values["ceiling"]:g} Pa is'
-                f' not allowed: the ceiling of foot {foot.source} is {foot.ceiling:g} Pa'
-            )
 
     def _check_options(self, changes: list[RosParameter]) -> SetParametersResult:
         """Refuse changes of backend options while devices are open; *configure* reads them."""
@@ -172,14 +165,15 @@ class RegulatorNode(PadNode, LifecycleNode):
 
     def _backend_options(self) -> dict[str, Any]:
         """Return the options of the backend: one value for all legs, or a list with one a leg."""
-        options: dict[str, Any] = {}
-        if self.values['backend'] == 'simulated':
-            begun = 0.0 if self.simulated else time.monotonic()
-            now = (lambda: self._elapsed_ns * 1e-9) if self.simulated else time.monotonic
-            foot: Foot = self.values['foot']
-            options = {'clock': lambda: now() - begun, 'pad_volume': foot.air_volume}
-            if self.values['scene']:
-                options |= self.values['scene'].regulator_options
+        values, options = self.values, {}
+        if values['backend'] == 'simulated':
+            begun_ns = self._elapsed(0)
+            options = {
+                'clock': lambda: 1e-9 * (self._elapsed(self.tick_ns) - begun_ns),
+                'pad_volume': values['foot'].air_volume,
+            }
+            if values['scene']:
+                options |= values['scene'].regulator_options
         for name in self.get_parameters_by_prefix(BACKEND_OPTIONS):
             options[name] = plain(self.get_parameter(f'{BACKEND_OPTIONS}.{name}').value)
         if 'ceiling' in options:
@@ -275,7 +269,7 @@ class RegulatorNode(PadNode, LifecycleNode):
         """Return whether a record was ahead of a simulated time, ns, which does not go back."""
         return self.simulated and 0 <= self.tick_ns - clock_ns <= TICK_PERIOD_NS
 
-    def _tick(self, now_ns: int) -> None:
+    def _on_time(self, now_ns: int) -> None:
         if self.active and self._ahead_of(now_ns):
             return
         self._supervise(now_ns)
@@ -284,12 +278,12 @@ class RegulatorNode(PadNode, LifecycleNode):
         if answers and abs(now_ns - self._record_ns) <= TICK_PERIOD_NS:
             return
         if self._read_pace.due(now_ns) and self.supervision.channels:
-            self._send(self.supervision.read(now_ns, self._elapsed_ns))
+            self._send(self.supervision.read(now_ns, self._elapsed(now_ns)))
 
     def _supervise(self, now_ns: int) -> None:
         """Vent pads without commands, and report on ``/diagnostics``."""
-        self.tick_ns, self._elapsed_ns = now_ns, self._elapsed(now_ns)
-        self.supervision.tick(self._elapsed_ns)
+        self.tick_ns = now_ns
+        self.supervision.tick(self._elapsed(now_ns))
         if self._check_pace.due(now_ns):
             self._diagnose(now_ns)
 
@@ -303,26 +297,21 @@ class RegulatorNode(PadNode, LifecycleNode):
         refused = any(each.answers.due for each in channels)
         if not (self.due(now_ns, problems) or refused):
             return
-        parts: list[tuple[str, object, Health, Mapping[str, object]]] = [
-            (f'leg {each.leg} regulator', each.leg, each.answers.report(health), each.figures())
+        backend = self.values['backend']
+        statuses = [
+            self.status(
+                f'leg {each.leg} regulator',
+                *each.answers.report(health),
+                each.figures(),
+                f'{backend} {each.leg}',
+            )
             for each, health in zip(channels, found, strict=True)
         ]
         if channels:
-            parts.append(('supply', 'supply', supply, {}))
-        backend = self.values['backend']
-        self.report(
-            now_ns,
-            [
-                self.status(name, bytes([level]), message, figures, f'{backend} {part}')
-                for name, part, (level, message), figures in parts
-            ],
-        )
+            statuses.append(self.status('supply', *supply, part=f'{backend} supply'))
+        self.report(now_ns, statuses)
 
 
 def _settings(values: Mapping[str, Any]) -> SupervisorSettings:
-    names = [each.name for each in fields(SupervisorSettings)]
-    return SupervisorSettings(**{name: values[name] for name in names})
-
-
-if __name__ == '__main__':
-    sys.exit(run(RegulatorNode))
+    own = {each.name: values[each.name] for each in fields(SupervisorSettings)}
+    return SupervisorSettings(**own)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,16 +12,15 @@ from typing import Any
 import numpy as np
 
 from ros_pad.bags import topics
-from ros_pad.bags.topics import STAMP
 from ros_pad.contact import Foot
-from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput, LimitError
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes.base import PadNode
-from ros_pad.nodes.markers import ARRAY, WalkMarkers
+from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.parameters import SCENE, SEED, Parameter
-from ros_pad.nodes.process import run
+from ros_pad.nodes.qos import publisher
 from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, RealTime
-from ros_pad.records import SAMPLE, Block, split
+from ros_pad.records import SAMPLE, Block
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import Scene
@@ -48,7 +46,6 @@ PARAMETERS = (
         choices=SOURCES,
     ),
     Parameter('publish_clock', False, 'Stamp with simulated time, and publish it on /clock.'),
-    Parameter('free_running', True, 'Step in real time by a timer; false: a program steps it.'),
 )
 
 HIGHEST = 1e6
@@ -69,6 +66,13 @@ class SimulatorNode(PadNode):
     with, the true pose of the body. Parameters are in :data:`PARAMETERS`. Pads are flat until
     their pressure is received. In real time, ``/diagnostics`` has once a second the wanted and the
     reached rate: where the computer is too slow, simulated time is left out.
+
+    Parameters
+    ----------
+    free_running : bool
+        Whether a timer steps the robot in real time; else a program does.
+    **kwargs
+        Passed on to `rclpy.node.Node`.
 
     Attributes
     ----------
@@ -92,7 +96,7 @@ class SimulatorNode(PadNode):
         When a parameter is not allowed.
     """
 
-    def __init__(self, **kwargs: Any) -> None:
+    def __init__(self, free_running: bool = True, **kwargs: Any) -> None:
         super().__init__('simulator', PARAMETERS, **kwargs)
         values, seed = self.values, self.values['seed']
         self.scene: Scene = values['scene']
@@ -107,55 +111,49 @@ class SimulatorNode(PadNode):
             raise ConfigError(f'node {self.get_name()}: {error}') from error
         period = self.period_ns * 1e-9
         self.robot = fidelity.build(with_terms(self.scene), self.floor, period, level)
-        self._sensors = Sensors(self.scene, seed)
-        self._body_sensors: BodySensors | None = None
+        self._sensors: Sensors | BodySensors = Sensors(self.scene, seed)
         if joints:
-            self._body_sensors = BodySensors(self.scene, seed, len(self.robot.joint_names))
+            self._sensors = BodySensors(self.scene, seed, len(self.robot.joint_names))
         self.time_ns = self._last_ns = 0  # simulated time, and stamp of the last sample
         self.pressures = [0.0] * len(self.scene.legs)
         self._control_pace, self._markers_pace = Pace(CONTROL_PERIOD_NS), Pace(MARKERS_PERIOD_NS)
         self._markers = WalkMarkers(self.scene, self.floor)
-        self._outputs = self._advertised()
+        self._outputs = self._advertised(joints)
         self.receive_record(topics.PRESSURE, self.scene.legs, self._on_pressure)
         # Without a timer, the caller of step() reports fidelity level and verdict.
         self.answered: Callable[[], None] = lambda: None
-        if values['free_running']:
+        self._real_time: RealTime | None = None
+        if free_running:
             choice = fidelity.choose(self.scene, level)
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
-            self._real_time: RealTime | None = None
             # The timers cannot follow the clock that this node publishes.
             self.every(max(self.period_ns, CONTROL_PERIOD_NS) * 1e-9, self._on_timer)
             self.every(1.0, self._diagnose)
 
-    def _advertised(self) -> dict[str, Callable[..., None]]:
+    def _advertised(self, joints: bool) -> dict[str, Callable[..., None]]:
         """Return a function for each topic, which publishes a message."""
-        joints, noise = self.robot.joint_names, self.scene.sensors
+        noise, moment = self.scene.sensors, ['moment'] * bool(self.scene.sensors.moment)
         pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
-        measured, parts = ['force', 'position'], ['position']
-        if self._body_sensors:
-            measured, parts = ['force'], ['position', 'velocity', 'effort']
-        measured += ['moment'] * bool(noise.moment)
-        record = topics.FORCE if self._body_sensors else topics.SAMPLE
-        outputs = {
-            'markers': self.output(topics.MARKERS),
-            'pose': self.sender(topics.BODY_POSE, (*STAMP, *pose)),
+        record, measured = topics.SAMPLE, ['force', 'position', *moment]
+        if joints:
+            record, measured = topics.FORCE, ['force', *moment]
+        outputs: dict[str, Callable[..., None]] = {
+            'markers': publisher(self, topics.MARKERS).publish,
+            'pose': self.sender(topics.BODY_POSE, pose),
             'record': self.record_output(record, self.scene.legs, measured),
         }
         if self.values['publish_clock']:
-            outputs['clock'] = self.sender(topics.CLOCK, topics.CLOCK.values)
+            outputs['clock'] = self.sender(topics.CLOCK)
+        if names := self.robot.joint_names:
+            paths = ('position', *(('velocity', 'effort') if joints else ()))
+            outputs['joints'] = self.sender(topics.JOINT_STATES, paths, constants={'name': names})
         if joints:
-            outputs['joints'] = self.sender(
-                topics.JOINT_STATES, (*STAMP, *parts), constants={'name': joints}
-            )
-        if self._body_sensors:
             covariances = {
                 'orientation_covariance': [-1.0] + [0.0] * 8,  # it measures no orientation
                 'angular_velocity_covariance': np.diag([noise.gyro**2] * 3).ravel(),
                 'linear_acceleration_covariance': np.diag([noise.accelerometer**2] * 3).ravel(),
             }
-            outputs['imu'] = self.sender(
-                topics.IMU, (*STAMP, *topics.IMU.values), constants=covariances
-            )
+            outputs['imu'] = self.sender(topics.IMU, topics.IMU.values, constants=covariances)
         return outputs
 
     def _on_pressure(self, block: Block) -> None:
@@ -164,11 +162,8 @@ class SimulatorNode(PadNode):
         gauges = np.where(np.isfinite(rows['pad']), rows['pad'], rows['pressure']).tolist()
         for index, gauge in enumerate(gauges):
             if gauge > HIGHEST:
-                self.get_logger().warning(
-                    f'leg {self.scene.legs[index]}: pressure of {gauge:g} Pa gauge ignored: at'
-                    f' most {HIGHEST:g} Pa is allowed',
-                    throttle_duration_sec=1.0,
-                )
+                error = LimitError(f'{gauge:g} Pa gauge: at most {HIGHEST:g} Pa is allowed')
+                self.refuse(f'leg {self.scene.legs[index]}, {topics.PRESSURE.name()}', error)
             elif math.isfinite(gauge):
                 # A sensor at rest may read slightly below ambient; the pad is flat then.
                 self.pressures[index] = max(0.0, gauge)
@@ -232,44 +227,34 @@ class SimulatorNode(PadNode):
         for row, stamp_ns in zip(rows, stamps.tolist(), strict=True):
             count += 1
             self.robot.step(self.pressures)
-            stamp = split(stamp_ns)
             x, y, heading = self.robot.body
             turn = math.sin(0.5 * heading), math.cos(0.5 * heading)
-            self._outputs['pose'](*stamp, x, y, *turn)
-            row[:] = self._sense(stamp, later)
+            self._outputs['pose'](stamp_ns, x, y, *turn)
+            if isinstance(self._sensors, Sensors):
+                row[:] = self._sensors.sample(self.robot)
+            else:
+                assert isinstance(self.robot, FullRobot)
+                reading = self._sensors.read(self.robot.proprioception(), self.robot.time)
+                row[:] = reading.rows
+                later.append(('imu', (stamp_ns, *reading.imu.ravel().tolist())))
+                later.append(('joints', (stamp_ns, *reading.joints)))
             if self.robot.verdict and simulated:
                 break
-        self._last_ns = int(stamps[count - 1])
+        self._last_ns = stamp_ns
         self.tick(count)
         self._outputs['record'](Block(stamps[:count], rows[:count]))
+        if self.robot.joint_names and not later:
+            later.append(('joints', (stamp_ns, self.robot.joint_positions)))
         for name, values in later:
             self._outputs[name](*values)
-        if self.robot.joint_names and not self._body_sensors:
-            self._outputs['joints'](*split(self._last_ns), self.robot.joint_positions)
-        if self._markers_pace.due(self._last_ns):
-            array = self._markers.message(self.robot, self.pressures, self._last_ns)
-            self._outputs['markers'](ARRAY.encode(array))
+        if self._markers_pace.due(stamp_ns):
+            markers = self._markers.message(self.robot, self.pressures, stamp_ns)
+            self._outputs['markers'](markers)
         return count
-
-    def _sense(
-        self, stamp: tuple[int, int], later: list[tuple[str, tuple[Any, ...]]]
-    ) -> np.ndarray:
-        """Return readings of the feet; add those of IMU and joints."""
-        if not self._body_sensors:
-            return self._sensors.sample(self.robot)
-        assert isinstance(self.robot, FullRobot)
-        reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
-        later.append(('imu', (*stamp, *reading.imu.ravel().tolist())))
-        later.append(('joints', (*stamp, *reading.joints)))
-        return reading.rows
 
     def tick(self, samples: int = 1) -> None:
         """Advance simulated time, but not the robot; :meth:`step` does both."""
         self.time_ns += samples * self.period_ns
         if self.values['publish_clock']:
             self._last_ns = self.time_ns
-            self._outputs['clock'](*split(self.time_ns))
-
-
-if __name__ == '__main__':
-    sys.exit(run(SimulatorNode))
+            self._outputs['clock'](self.time_ns)

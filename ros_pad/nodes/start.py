@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from functools import partial
 
 from ros_pad.signals import STOP
@@ -23,3 +24,6 @@ recorder = partial(_start, 'recorder', 'RecorderNode')
 regulator = partial(_start, 'regulator', 'RegulatorNode')
 simulator = partial(_start, 'simulator', 'SimulatorNode')
 views = partial(_start, 'views', 'ViewsNode')
+
+if __name__ == '__main__':
+    sys.exit(globals()[sys.argv.pop(1)]())

@@ -9,24 +9,22 @@ others, and markers of the feet coloured by their probability of wet ground.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import String
 
 from ros_pad.bags import topics
-from ros_pad.bags.topics import STAMP, Topic
+from ros_pad.bags.topics import Topic
 from ros_pad.control.policies import DOME, FLAT
 from ros_pad.estimation import doubt as doubts
-from ros_pad.nodes.base import PadNode, set_stamp
-from ros_pad.nodes.markers import ARRAY, marker_of_foot
+from ros_pad.nodes.base import PadNode
+from ros_pad.nodes.markers import array_of, marker_of_foot
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
-from ros_pad.nodes.process import run
+from ros_pad.nodes.qos import publisher
 from ros_pad.pace import Pace
-from ros_pad.records import Block, split
+from ros_pad.records import Block
 
 SHOWN = [each for each in topics.OF_LEGS if each is not topics.LEG_FOOT_WRENCH]
 """Topics of a leg that records have."""
@@ -70,13 +68,13 @@ class ViewsNode(PadNode):
             if shows:
                 self.receive_record(record, self._legs, partial(self._show, shows))
         self.receive_record(topics.ESTIMATE, self._legs, self._mark)
-        self._send_markers = self.output(topics.FEET_MARKERS)
+        self._send_markers = publisher(self, topics.FEET_MARKERS).publish
         self._markers_pace = Pace(MARKERS_PERIOD_NS)
         self._places = np.full((len(self._legs), 2), np.nan)
 
     def _numbers(self, topic: Topic, leg: int) -> Show:
         """Return a function that publishes numbers of a leg, if none of them is missing."""
-        send = self.sender(topic, (*(STAMP if topic.frame else ()), *topic.values), leg)
+        send = self.sender(topic, topic.values, leg)
         assert topic.record
         columns = [topic.record.columns.index(each) for each in topic.columns]
         needed = slice(0, 3) if topic is topics.LEG_WRENCH else slice(None)
@@ -87,19 +85,19 @@ class ViewsNode(PadNode):
                 return
             numbers = np.nan_to_num(numbers, posinf=np.inf)
             values = topics.from_record(topic, numbers, self.values['ambient_pressure'])
-            send(*(split(stamp_ns) if topic.frame else ()), *values.tolist())
+            send(*([stamp_ns] if topic.frame else []), *values.tolist())
 
         return show
 
     def _text(self, topic: Topic, leg: int, text_of: Callable[[Any], str | None]) -> Show:
         """Return a function that publishes a text of a leg when it changes."""
-        publish, last = self.output(topic, leg), ['?']
+        send, last = self.sender(topic, topic.values, leg), ['?']
 
         def show(stamp_ns: int, row: np.ndarray) -> None:
             text = text_of(row)
             if text is not None and text != last[0]:
                 last[0] = text
-                publish(String(data=text))
+                send(text)
 
         return show
 
@@ -117,16 +115,9 @@ class ViewsNode(PadNode):
             return
         if self.refused and self.due(block.last_ns):
             self.report(block.last_ns, [])
-        array = ARRAY.blank()
-        for leg, place, wetness in zip(
-            self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True
-        ):
-            if math.isfinite(sum(place)):
-                marker = marker_of_foot(leg, place[0], place[1], wetness)
-                marker.header.frame_id = self.values['frame']
-                set_stamp(marker.header.stamp, block.last_ns)
-                array.markers.append(marker)
-        self._send_markers(ARRAY.encode(array))
+        feet = zip(self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True)
+        markers = [marker_of_foot(leg, at, wet) for leg, at, wet in feet if math.isfinite(sum(at))]
+        self._send_markers(array_of(markers, block.last_ns, self.values['frame']))
 
 
 def _doubt(row: Any) -> str | None:
@@ -137,7 +128,3 @@ def _doubt(row: Any) -> str | None:
 def _morphology(row: Any) -> str | None:
     """Return the morphology in a command; None where it is missing."""
     return None if math.isnan(row['dome']) else DOME if row['dome'] == 1.0 else FLAT
-
-
-if __name__ == '__main__':
-    sys.exit(run(ViewsNode))

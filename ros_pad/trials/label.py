@@ -32,7 +32,7 @@ MADE_WITH = 'ros_pad_made_with'
 """Key of the versions of the software that made the bag."""
 
 PARAMETERS = 'ros_pad_parameters'
-"""Key of the parameters of all nodes on the ROS graph, by full name of the node."""
+"""Key of the first parameters of the nodes of ros_pad, by full name of the node."""
 
 CHANGES = 'ros_pad_parameter_changes'
 """Key of the parameters that changed while recording: log time in ns, node, name, new value."""

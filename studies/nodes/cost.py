@@ -50,6 +50,7 @@ LONGEST = 60.0  # s, until the recorder has started, however slow the machine
 _HERE = pathlib.Path(__file__).resolve().parents[2]
 
 # Runs in either checkout.
+_START = 'from ros_pad.nodes.start import {0}; {0}()'  # in older checkouts, too
 _RATE = """
 import sys
 from ros_pad.bags import BagReader
@@ -141,7 +142,7 @@ def _live(checkout: pathlib.Path, bag: pathlib.Path, seconds: float) -> dict[str
     """Return the processor time a sample, ms, of all nodes and of each, memory, and the rate."""
     commands = {
         node: [
-            *(_python(checkout), '-m', f'ros_pad.nodes.{node}', '--ros-args'),
+            *(_python(checkout), '-c', _START.format(node), '--ros-args'),
             *('--params-file', os.fspath(checkout / 'config' / 'params.yaml')),
             *(('-p', f'folder:={bag}') if node == 'recorder' else ()),
         ]

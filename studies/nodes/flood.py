@@ -237,7 +237,7 @@ def run(
         Called after each round with the number of rounds.
     """
     result = Result(kind)
-    node = ('ros_pad.nodes.regulator', '--ros-args', '-p', f'command_timeout:={TIMEOUT}')
+    node = ('ros_pad.nodes.start', 'regulator', '--ros-args', '-p', f'command_timeout:={TIMEOUT}')
     rclpy.init()
     try:
         with (

@@ -11,7 +11,6 @@ from __future__ import annotations
 import gc
 import os
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -24,6 +23,8 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ.setdefault('ROS_LOG_DIR', tempfile.mkdtemp(prefix='ros_pad_log_'))
 
 rclpy = pytest.importorskip('rclpy', reason='the node tests need ROS 2')
+
+from helpers import Bench, wait_for  # noqa: E402
 
 Until = Callable[..., None]
 
@@ -55,17 +56,11 @@ def until(executor: rclpy.executors.Executor) -> Until:
     def until(
         predicate: Callable[[], object], timeout: float = 60.0, what: str = 'the condition'
     ) -> None:
-        deadline = time.monotonic() + timeout
-        while not predicate():
-            if time.monotonic() > deadline:
-                pytest.fail(f'waited for {what}: timeout after {timeout:g} s')
-            executor.spin_once(timeout_sec=0.01)
+        wait_for(predicate, what, lambda: executor.spin_once(timeout_sec=0.01), timeout)
 
     return until
 
 
 @pytest.fixture
 def bench(context, executor, until, monkeypatch):
-    from helpers import Bench
-
     return Bench(context, executor, until, monkeypatch)

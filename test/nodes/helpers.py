@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+import importlib
+import subprocess
+import sys
+import time
 from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
@@ -19,15 +23,44 @@ from std_msgs.msg import Header
 from ros_pad.bags import topics
 from ros_pad.bags.topics import Topic
 from ros_pad.bags.wire import Wire, legs_of
+from ros_pad.errors import TransportError
 from ros_pad.nodes.qos import message_class
 from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind, split
+from ros_pad.regulators import Reading
+from ros_pad.regulators.protocol import permitted
 
 MS = 1_000_000
 SECOND = 1_000 * MS
 AMBIENT = 101325.0
 SIX = (1, 2, 3, 4, 5, 6)
+NODES = (
+    'simulator', 'body_estimator', 'estimator', 'controller', 'regulator', 'merge', 'views',
+    'recorder',
+)  # fmt: skip
 LOAD = 6.83
 """Load of a foot in stance, N."""
+
+
+def wait_for(condition, what='the condition', turn=lambda: time.sleep(0.01), seconds=60.0):
+    """Call ``turn`` until a condition holds, and return what it is; fail after some seconds."""
+    deadline = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < deadline, f'waited for {what}: timeout after {seconds:g} s'
+        turn()
+    return found
+
+
+def start_node(name: str, *parameters: str) -> subprocess.Popen[str]:
+    """Start a node in a process of its own, with parameters such as ``legs:=[1]``."""
+    given = [word for each in parameters for word in ('-p', each)]
+    command = [sys.executable, '-m', 'ros_pad.nodes.start', name, '--ros-args', *given]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def node_class(name: str) -> Any:
+    """Return the class of a node, whose module has its parameters."""
+    module = importlib.import_module(f'ros_pad.nodes.{name}')
+    return getattr(module, f'{name.title().replace("_", "")}Node')
 
 
 def nanoseconds(stamp: Time) -> int:
@@ -113,6 +146,45 @@ def deliver(node: Node, name: str, data: bytes) -> None:
         each.callback(data if each.raw else deserialize_message(data, each.msg_type))
 
 
+class Device:
+    """A device that keeps what it received; its cable may break."""
+
+    made: tuple[Device, ...] = ()
+
+    def __init__(self, ceiling, port='usb', clock=None, pad_volume=0.0):
+        self.ceiling, self.port = ceiling, port
+        self.setpoint, self.received = 40e3, []  # of an earlier user
+        self.is_open = False
+        self.broken = None  # error with which its answers are lost
+        Device.made = (*Device.made, self)
+
+    def open(self):
+        if self.port == 'none':
+            raise TransportError("no such port: 'none'")
+        self.is_open = True
+
+    def set_pressure(self, gauge_pa):
+        self.received.append(gauge_pa)
+        self.setpoint = permitted(gauge_pa, self.ceiling)
+        self._answer()
+
+    def read(self):
+        self._answer()
+        return Reading(self.setpoint, self.setpoint, (), 0.0)
+
+    def vent(self):
+        self._answer()
+        self.setpoint = 0.0
+
+    def close(self):
+        self.is_open = False
+
+    def _answer(self):
+        assert self.is_open
+        if self.broken:
+            raise self.broken
+
+
 class Bench:
     """Run nodes, hand messages to them and keep what they publish, all without DDS.
 
@@ -142,10 +214,8 @@ class Bench:
 
     def start(self, kind: Callable[..., Any], **parameters: Any) -> Any:
         """Start a node, unless told otherwise with legs 1 and 2 and in simulated time."""
-        values = {'use_sim_time': True} | parameters
-        if kind.__name__ != 'SimulatorNode':
-            values = {'legs': list(self.legs)} | values
-            self.legs = tuple(values['legs'])
+        values = {'use_sim_time': True, 'legs': list(self.legs)} | parameters
+        self.legs = tuple(values['legs'])
         self.node = kind(context=self._context, parameter_overrides=overrides(values))
         self._executor.add_node(self.node)
         self.nodes.append(self.node)

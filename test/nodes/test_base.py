@@ -2,35 +2,29 @@
 """What all nodes have in common: ticks, stamps, and QoS of topics."""
 
 import pytest
-from builtin_interfaces.msg import Time
-from helpers import MS, nanoseconds
-from rclpy.qos import DurabilityPolicy, QoSCompatibility, ReliabilityPolicy, qos_check_compatible
+from helpers import MS
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSCompatibility,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
 
 from ros_pad.bags import topics
 from ros_pad.nodes import qos
-from ros_pad.nodes.base import PadNode, set_stamp
+from ros_pad.nodes.base import PadNode
+from ros_pad.nodes.parameters import LEGS
 
 
-@pytest.mark.parametrize(
-    ('time_ns', 'sec', 'nanosec'),
-    [(0, 0, 0), (999_999_999, 0, 999_999_999), (-1, -1, 999_999_999)],
-)
-def test_stamps_are_whole_nanoseconds(time_ns, sec, nanosec):
-    for late_ns in (0, 2**32 * 10**9):  # a stamp has no more seconds
-        stamp = Time()
-        set_stamp(stamp, time_ns + late_ns)
-        assert (stamp.sec, stamp.nanosec) == (sec, nanosec)
-        assert nanoseconds(stamp) == time_ns
-
-
-def test_in_simulated_time_each_clock_message_is_a_tick_where_no_records_come(bench):
+@pytest.mark.parametrize('all_steps', [False, True])
+def test_in_simulated_time_the_clock_ticks_where_no_records_come(bench, all_steps):
     """Which of a record and the clock of its moment comes first means nothing."""
-    ticks, all_steps = [], []
+    ticks = []
 
     def probe(**kwargs):
-        node = PadNode('probe', (), **kwargs)
-        node.on_tick(ticks.append, 0.001)
-        node.on_tick(all_steps.append, 0.001, all_steps=True)
+        node = PadNode('probe', (LEGS,), **kwargs)
+        node.on_tick(ticks.append, 0.001, all_steps=all_steps)
         return node
 
     node = bench.start(probe)
@@ -41,23 +35,26 @@ def test_in_simulated_time_each_clock_message_is_a_tick_where_no_records_come(be
             bench.clock(time_ms * MS)
         return [each // MS for each in ticks]
 
-    assert clock(1_000, 3_000, 2_000) == [1_000, 3_000, 2_000]
-    node.advance(2_020 * MS, ticks.append)
-    assert ticks[-1] == 2_020 * MS
-    assert clock(1_919, 1_920, 2_000, 2_020, 2_040, 2_120, 2_121, 2_200) == [1_919, 2_121, 2_200]
-    assert len(all_steps) == 11
+    times = [1_000, 1_010, 3_000, 2_000]  # once in 0.1 s, or all; also where it is set back
+    assert clock(*times) == (times if all_steps else [1_000, 3_000, 2_000])
+    node.advance(2_020 * MS)
+    assert (ticks[-1] == 2_020 * MS) == all_steps
+    node.advance(2_120 * MS)
+    assert ticks[-1] == 2_120 * MS
+    times = [2_019, 2_020, 2_100, 2_120, 2_140, 2_220, 2_221, 2_300]
+    assert clock(*times) == (times if all_steps else [2_019, 2_221, 2_300])
 
 
 def test_in_real_time_a_timer_ticks(context, executor, until):
     node = PadNode('probe', (), context=context)
     executor.add_node(node)
     ticks = []
-    node.on_tick(ticks.append, 0.01)
+    node.on_tick(ticks.append, 0.01, all_steps=True)
     before = node.get_clock().now().nanoseconds
     until(lambda: len(ticks) == 5)
     assert ticks[0] > before
     assert ticks == sorted(ticks)
-    node.advance(0, ticks.append)  # records are no ticks
+    node.advance(0)  # records are no ticks
     assert ticks[-1] > before
 
 
@@ -71,3 +68,7 @@ def test_both_ends_of_each_topic_match_and_what_must_arrive_is_reliable(topic):
     reliable = ends.subscribe.reliability == ReliabilityPolicy.RELIABLE
     assert reliable == (topic in certain or topic.text)
     assert (ends.publish.durability == DurabilityPolicy.TRANSIENT_LOCAL) == topic.text
+    for wanted in (False, True):  # a recorder may ask for repetition
+        profile = qos.recording(topic, wanted)
+        assert profile.history == HistoryPolicy.KEEP_ALL
+        assert (profile.reliability == ReliabilityPolicy.RELIABLE) == (reliable or wanted)

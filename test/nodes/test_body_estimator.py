@@ -2,6 +2,7 @@
 """The body estimator node on messages of a robot that stands."""
 
 import math
+import pathlib
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from ros_pad.records import SAMPLE
 from ros_pad.robots import Robot as Kinematics
 
 LEGS = (1, 2, 3, 4, 5, 6)
+QUADRUPED = pathlib.Path(__file__).parents[2] / 'bags' / 'quadruped' / 'robot.urdf'
 CH3R = Kinematics.load('ch3r')
 SHARE = CH3R.mass * 9.81 / 6.0
 NONE = (math.nan, math.nan, math.nan)
@@ -86,9 +88,14 @@ def robot(bench):
 
 
 def test_a_standing_robot(robot):
-    robot.start()
+    node, sent = robot.start(), []
+    node._send_tf = sent.append  # as with publish_tf, for which tf2_msgs must be installed
     robot.stand(600)
     odom = robot.bench.heard(topics.ODOM)[-1]
+    (shown,) = sent[-1]
+    assert (shown.header.frame_id, shown.child_frame_id) == ('odom', 'base_link')
+    assert shown.transform.rotation.w == odom.pose.pose.orientation.w
+    assert shown.transform.translation.z == odom.pose.pose.position.z
     assert len(robot.bench.heard(topics.ODOM)) == robot.node.stage.samples == 146
     assert (odom.header.frame_id, odom.child_frame_id) == ('odom', 'base_link')
     assert odom.header.stamp.nanosec == 600 * MS
@@ -156,14 +163,6 @@ def test_another_robots_topics_by_a_mapping(robot, tmp_path):
     assert np.isinf(rows[-1]['variance']).all()
 
 
-def test_joints_are_matched_by_name(robot):
-    robot.start()
-    order = [*reversed(range(18))]
-    names = ['head', *(CH3R.joint_names[place] for place in order)]
-    robot.stand(40, names, position=[7.0, *CH3R.home.ravel()[order]], velocity=np.zeros(19))
-    assert robot.samples()[1][-1]['position'] == pytest.approx([0.0, 0.224, -0.141], abs=2e-3)
-
-
 @pytest.mark.parametrize(
     ('spoil', 'reason'),
     [
@@ -205,11 +204,15 @@ def test_a_reading_that_is_missing_leaves_a_gap_and_no_more(robot, missing, capf
     assert 'reading ignored' not in capfd.readouterr().err
 
 
-def test_neither_forces_nor_efforts(robot):
-    robot.start(forces='efforts')
-    robot.stand(40)
-    assert robot.doubt() == 'force: neither foot forces nor efforts'
-    assert np.isinf(robot.samples()[1][-1]['variance']).all()
+def test_a_robot_of_a_urdf(robot):
+    robot.start(
+        robot=str(QUADRUPED),
+        feet='FL_foot, FR_foot, RL_foot, RR_foot',
+        imu_link='imu',
+        foot_radius=0.022,
+        legs=[1, 2, 3, 4],
+    )
+    assert robot.status().hardware_id == 'quadruped'
 
 
 @pytest.mark.parametrize(

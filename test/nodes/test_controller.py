@@ -84,6 +84,12 @@ def test_dome_on_wet_ground_and_flat_again_on_dry(robot):
     assert (domes[0], max(domes), domes[-1]) == (0.0, 1.0, 0.0)
 
 
+def test_a_changed_policy_decides_from_then_on(robot):
+    robot.start(policy='adaptive')
+    assert robot.bench.set('policy.wet_above', 1.0).successful
+    assert not any(robot.step(0.98)[0] > 0.0 for _ in range(8))
+
+
 def test_a_fixed_pressure_is_taken_as_it_is(robot):
     robot.start(policy='dome', dome_pressure=40e3)
     assert robot.estimate().tolist() == [(1.0, 40e3), (1.0, 40e3)]
@@ -134,19 +140,6 @@ def test_a_row_that_lacks_something_concerns_its_leg_only(robot, case):
         robot.estimate()
     assert not node.controller.fault(1)
     assert (robot.step(0.5) > 0.0).all()
-
-
-def test_values_that_are_missing_do_not_count_as_a_step(robot):
-    """A foot must not switch while it stands."""
-    node = robot.start()
-    for _ in range(3):
-        robot.step(0.5)
-    robot.estimate(wetness=0.98)
-    switches = dict(node.controller.switches)
-    for fields in LOST.values():
-        robot.estimate(**({'wetness': 0.98} | fields))
-        assert robot.estimate(wetness=0.98)['setpoint'].tolist() == [0.0, 0.0]
-    assert node.controller.switches == switches
 
 
 def test_a_pressure_that_does_not_follow_is_a_fault_of_its_leg(robot):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import LOAD, MS, SECOND, overrides, pressure, sample
+from helpers import LOAD, MS, SECOND, overrides, sample
 
 from ros_pad.bags import topics
 from ros_pad.errors import ConfigError
@@ -100,18 +100,6 @@ def test_a_block_of_samples_gives_what_its_records_give(robot, bench):
     assert found[0] == found[1]
 
 
-def test_a_hidden_marker_gives_estimates_without_a_position(robot):
-    node = robot.start()
-    robot.sample()
-    for _ in range(28):
-        jitter = 1e-9 * math.sin(robot.now_ns)
-        robot.sample(force=(jitter, 0.0, LOAD + jitter), position=[HIDDEN, (jitter, 0.0, 0.0)])
-    assert node.stage.used == [29, 29]
-    assert np.isnan(robot.heard('position')[1:]).all()
-    assert np.isfinite(robot.heard('position', 2)).all()
-    assert 'marker lost' in robot.doubts() and 'marker lost' not in robot.doubts(2)
-
-
 BAD = {
     'missing': (math.nan, math.nan, math.nan),
     'tangential': (math.nan, 0.0, LOAD),
@@ -134,27 +122,6 @@ def test_a_row_that_is_no_sample_concerns_its_leg_only(robot, case):
         for field in ('wetness', 'friction', 'margin', 'slip_speed'):
             assert np.isfinite(robot.heard(field, leg)).all()
     assert np.nanmax(robot.heard('load')) == LOAD
-
-
-def test_a_pressure_that_is_missing_leaves_the_last_one_in_force(robot):
-    robot.start()
-    robot.bench.give(topics.PRESSURE, pressure(1, (80e3, 0.0)))
-    robot.sample()
-    robot.bench.give(topics.PRESSURE, pressure(2, (math.nan, math.nan)))
-    for _ in range(12):
-        robot.sample()
-    assert robot.doubts()[-1] == 'domed'
-    assert 'domed' not in robot.doubts(2)
-
-
-def test_evidence_of_a_pull_depends_on_the_morphology(robot):
-    """A dome sticks equally well on wet and dry ground; pressure shows whether the foot is one."""
-    robot.start()
-    robot.bench.give(topics.PRESSURE, pressure(1, (75e3, 0.0)))
-    robot.stance(ratio=0.3, speed=0.0)
-    domed, flat = (robot.heard('wetness', leg)[-1] for leg in (1, 2))
-    assert abs(domed - 0.5) < 0.2
-    assert flat < 0.2
 
 
 # --- doubts -------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from geometry_msgs.msg import TwistWithCovarianceStamped
 from helpers import (
     MS,
     SECOND,
+    Device,
     command,
     encoded,
     estimate,
@@ -42,7 +43,7 @@ from ros_pad.nodes.qos import message_class
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.views import ViewsNode
 from ros_pad.records import Block
-from ros_pad.regulators import BACKENDS, Reading
+from ros_pad.regulators import BACKENDS
 
 CEILING = 80e3
 LEGS = (1, 2)
@@ -111,40 +112,6 @@ def ticks(monkeypatch):
         RegulatorNode, 'on_tick', lambda self, call, *_, **__: callbacks.append(call)
     )
     return callbacks
-
-
-class Device:
-    """Records set-points; if its cable is ``broken``, its answers are lost."""
-
-    made = ()
-
-    def __init__(self, ceiling, clock=None, pad_volume=0.0):
-        self.ceiling, self.setpoint, self.received = ceiling, 0.0, []
-        self.broken = False
-        Device.made = (*Device.made, self)
-
-    def open(self):
-        pass
-
-    def set_pressure(self, gauge_pa):
-        self.received.append(gauge_pa)
-        self.setpoint = gauge_pa
-        self._answer()
-
-    def read(self):
-        self._answer()
-        return Reading(self.setpoint, self.setpoint, (), 0.0)
-
-    def vent(self):
-        self._answer()
-        self.setpoint = 0.0
-
-    def close(self):
-        pass
-
-    def _answer(self):
-        if self.broken:
-            raise TransportError('cable')
 
 
 class Rig:
@@ -224,7 +191,7 @@ class Rig:
 
     def cable(self, leg, broken):
         if device := self.device(leg):
-            device.broken = broken
+            device.broken = TransportError('cable') if broken else None
 
     def check(self):
         for device in Device.made:

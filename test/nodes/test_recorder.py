@@ -2,8 +2,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 import warnings
 
@@ -12,10 +10,8 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
-from helpers import MS, SECOND, SIX, encoded, header, overrides
+from helpers import MS, SECOND, SIX, encoded, header, overrides, start_node
 from helpers import record as record_of
-from rcl_interfaces.msg import Parameter as RosParameter
-from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -29,6 +25,7 @@ import ros_pad
 from ros_pad.bags import BagReader, BagWriter, topics
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
+from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.records import ESTIMATE, SAMPLE, Block
 from ros_pad.trials import label
@@ -163,29 +160,6 @@ def test_what_has_arrived_is_written_at_the_end(context, robot, record, until, t
     assert BagReader(tmp_path / 'trial').counts['/feet/estimate'] > 0
 
 
-def test_what_was_latched_before_is_recorded(robot, record, until, tmp_path):
-    qos.publisher(robot, topics.BODY_DOUBT).publish(String(data='slips'))
-    recorder = record()
-    until(lambda: recorder.message_count)
-    recorder.close()
-    ((topic, message, _),) = BagReader(tmp_path / 'trial').messages()
-    assert (topic, message.data) == ('/body/doubt', 'slips')
-
-
-def test_a_best_effort_driver_is_recorded_too(robot, record, until, tmp_path):
-    recorder = record()
-    reliable = qos.publisher(robot, topics.SAMPLE)
-    until(lambda: reliable.get_subscription_count())
-    driver = robot.create_publisher(JointState, 'feet/sample', qos.SENSOR)
-    publishers = (reliable, driver)
-    until(lambda: all(p.get_subscription_count() for p in publishers))
-    for publisher in publishers:
-        publisher.publish(publisher.msg_type())
-    until(lambda: recorder.message_count == 2)
-    recorder.close()
-    assert BagReader(tmp_path / 'trial').counts['/feet/sample'] == 2
-
-
 def on_disk(folder, topic):
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
@@ -208,107 +182,45 @@ def test_a_last_message_reaches_the_disk_although_none_follows(robot, record, un
     assert BagReader(tmp_path / 'trial').counts['/feet/estimate'] == 2
 
 
-def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
-    context, executor, record, until, tmp_path
+def test_the_parameters_of_the_nodes_and_their_changes_are_in_the_bag(
+    context, executor, robot, record, until, tmp_path
 ):
-    nodes = [
-        Node('gait', context=context, enable_rosout=False),
-        Node('other', namespace='elsewhere', context=context, enable_rosout=False),
-        Node('_hidden', context=context, enable_rosout=False),
-    ]
-    for node in nodes:
-        node.declare_parameter('stride', 0.14)
-        node.declare_parameter('homes', [0.1, 0.2])
-        executor.add_node(node)
-    recorder = record()
-    bag = tmp_path / 'trial'
-    until(lambda: '/gait' in (custom_data(bag, label.PARAMETERS) or {}))
-    changed = Parameter('stride', value=0.10)
-    events = nodes[1].create_publisher(ParameterEvent, '/parameter_events', 10)
-    until(lambda: events.get_subscription_count() >= 1)
-    strange = RosParameter(name='stride', value=ParameterValue(type=99))  # from another node
-    events.publish(ParameterEvent(node='/gait', changed_parameters=[strange]))
-    before = time.time_ns()
-    assert nodes[0].set_parameters([changed])[0].successful
-    until(lambda: custom_data(bag, label.CHANGES))
-    recorder.close()
-    ((at, *change),) = json.loads(BagReader(bag).custom_data[label.CHANGES])
-    assert change == ['/gait', 'stride', 0.1]
-    assert before <= at <= time.time_ns()
-    parameters = json.loads(BagReader(bag).custom_data[label.PARAMETERS])
-    assert parameters['/gait'] == {
-        'homes': [0.1, 0.2],
-        'stride': 0.14,
-        'use_sim_time': False,
-        'start_type_description_service': True,
-    }
-    assert set(parameters) <= {'/gait', '/robot', '/recorder'}
-
-
-def test_parameters_of_other_peoples_nodes_do_not_end_the_recording(
-    context, executor, record, until, tmp_path
-):
-    driver = Node('driver', context=context, enable_rosout=False)
-    # If one requested parameter has no value, rclpy and rclcpp return no values at all.
-    driver.declare_parameter('serial_number', Parameter.Type.STRING)
-    driver.declare_parameter('rate', 250)
-    driver.declare_parameter('key', [b'\x01', b'\xff'])
-    executor.add_node(driver)
-    recorder = record()
-
-    def parameters():
-        return (custom_data(tmp_path / 'trial', label.PARAMETERS) or {}).get('/driver', {})
-
-    until(lambda: {'rate', 'key'} <= set(parameters()))
-    recorder.close()
-    assert (parameters()['rate'], parameters()['key']) == (250, [1, 255])
-    assert 'serial_number' not in parameters()
-
-
-@pytest.fixture
-def gait(context, executor):
-    def gait(stride):
-        node = Node('gait', context=context, enable_rosout=False)
-        node.declare_parameter('stride', stride)
+    def controller(margin):
+        node = ControllerNode(context=context, parameter_overrides=overrides({'margin': margin}))
         executor.add_node(node)
         return node
 
-    return gait
+    def changes():
+        return custom_data(tmp_path / 'trial', label.CHANGES) or []
 
-
-@pytest.fixture
-def stride_in(tmp_path):
-    """Return a function for the parameter stride of /gait in the bag; None if missing."""
-
-    def stride_in():
-        parameters = custom_data(tmp_path / 'trial', label.PARAMETERS) or {}
-        return parameters.get('/gait', {}).get('stride')
-
-    return stride_in
-
-
-@pytest.mark.slow
-def test_a_node_that_comes_back_before_its_name_is_dropped_is_asked_again(
-    gait, record, until, executor, stride_in
-):
-    recorder = record()
-    killed = []
-    for stride in (0.14, 0.2):
-        node = gait(stride)
-        until(lambda stride=stride: stride_in() == stride)
-        executor.remove_node(node)  # it does not answer, but is on the graph
-        killed.append(node)
-    for node in killed:
-        node.destroy_node()
+    before, node, recorder = time.time_ns(), controller(1.3), record()
+    until(lambda: '/controller' in (custom_data(tmp_path / 'trial', label.PARAMETERS) or {}))
+    nonsense = qos.publisher(robot, topics.PARAMETERS)
+    until(nonsense.get_subscription_count)
+    for text in ('no JSON', '[1]', '{"/controller": 3}'):
+        nonsense.publish(String(data=text))
+    until(lambda: recorder.refused == {'/parameters': 3})
+    assert node.set_parameters([Parameter('margin', value=1.5)])[0].successful
+    until(changes)
+    executor.remove_node(node)
+    node.destroy_node()
+    controller(1.7)  # it comes back with another value
+    until(lambda: len(changes()) == 2)
     recorder.close()
-    assert stride_in() == 0.2
+    times, *rest = zip(*changes(), strict=True)
+    assert rest == [('/controller',) * 2, ('margin',) * 2, (1.5, 1.7)]
+    assert before <= times[0] <= times[1] <= time.time_ns()
+    parameters = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])
+    assert set(parameters) == {'/controller', '/recorder'}
+    assert parameters['/controller']['margin'] == 1.3
+    assert parameters['/controller']['legs'] == list(SIX)
 
 
 @pytest.mark.slow
 def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     driver = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     publisher = robot.create_publisher(PoseStamped, 'body/pose', driver)
-    process = start(f'folder:={tmp_path / "trial"}')
+    process = start_node('recorder', f'folder:={tmp_path / "trial"}')
     sent = 0
     statuses = []
     qos.subscription(robot, topics.DIAGNOSTICS, lambda array: statuses.extend(array.status))
@@ -347,26 +259,6 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     )  # fmt: skip
     assert statuses[0].message == f'too slow: {value.value} messages lost so far'
     assert (value.key, 0 < int(value.value) <= lost[1]) == ('/body/pose', True)
-
-
-@pytest.mark.parametrize('reliable', [False, True])
-def test_measurements_are_repeated_only_where_that_is_wanted(robot, record, until, reliable):
-    """Commands, states and diagnostics are reliable in any case."""
-
-    def asked(name):
-        peers = robot.get_subscriptions_info_by_topic(name)
-        return [peer.qos_profile.reliability for peer in peers]
-
-    node = record(**({'reliable': True} if reliable else {}))
-    measured = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
-    certain = (topics.COMMAND, topics.BODY_DOUBT, topics.DIAGNOSTICS)
-    for topic in topics.RECORDED:
-        name = f'/{topic.name().lstrip("/")}'
-        until(lambda name=name: asked(name), what=name)
-        if topic is not topics.CLOCK:
-            wanted = ReliabilityPolicy.RELIABLE if topic in certain else measured
-            assert asked(name) == [wanted], name
-    node.close()
 
 
 def test_simulated_time_is_that_of_stamps_and_of_the_clock(robot, record, until, tmp_path):
@@ -416,20 +308,11 @@ def test_a_full_disk_is_not_silent(robot, record, until, monkeypatch):
     recorder.close()
 
 
-def start(*parameters):
-    arguments = [word for parameter in parameters for word in ('-p', parameter)]
-    return subprocess.Popen(
-        [sys.executable, '-m', 'ros_pad.nodes.recorder', '--ros-args', *arguments],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
 @pytest.mark.parametrize('number_of_signal', [signal.SIGINT, signal.SIGTERM])
 def test_signals_close_the_bag(number_of_signal, robot, until, tmp_path):
     publisher = robot.create_publisher(JointState, 'feet/estimate', KEPT)
     folder = tmp_path / 'trial'
-    process = start(f'folder:={folder}', 'reliable:=true')
+    process = start_node('recorder', f'folder:={folder}', 'reliable:=true')
     try:
         until(lambda: publisher.get_subscription_count())
         for number in range(100):

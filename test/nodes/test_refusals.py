@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages that cannot be read are counted and reported, and the node goes on."""
 
-import struct
-
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import MS, command, encoded, estimate, position, sample, wrench
+from helpers import MS, command, encoded, estimate, sample
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from ros_pad.bags import topics
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
-from ros_pad.nodes.merge import MergeNode
 from ros_pad.nodes.regulator import RegulatorNode
 
-WRENCH, POSITION = topics.LEG_WRENCH, topics.LEG_POSITION
 # Node, topic and content that it answers, and the topic of the answer.
 CASES = {
     'estimator': (EstimatorNode, topics.SAMPLE, sample, topics.ESTIMATE),
@@ -53,44 +49,6 @@ def test_records_that_cannot_be_read_are_counted_and_reported(bench, name):
     assert report.message.startswith(f'{full_name}: message refused: unknown names knee')
     assert [each.key for each in report.values] == [full_name]
     assert len({each.name for _, each in bench.statuses()}) > 1  # no other status is lost
-
-
-@pytest.fixture
-def merge(bench, monkeypatch):
-    monkeypatch.setattr(MergeNode, 'count_publishers', lambda node, name: 0)
-    return bench.start(MergeNode)
-
-
-def joins(bench):
-    """Give the rest of a record that begins at 5.000000006 s; return its wrench of leg 1."""
-    stamp_ns = 5_000 * MS + 6
-    bench.give(POSITION, position(stamp_ns), 1)
-    for topic, message in ((WRENCH, wrench(stamp_ns)), (POSITION, position(stamp_ns))):
-        bench.give(topic, message, 2)
-    (block,) = bench.heard(topics.SAMPLE)
-    assert block.last_ns == stamp_ns
-    return [*block.rows['force'][0, 0], block.rows['moment'][0, 0]]
-
-
-WHOLE = serialize_message(wrench(1, frame='leg_1_sole'))
-
-
-@pytest.mark.parametrize(
-    ('data', 'reason'),
-    [
-        (b'\0\7\0\0' + WHOLE[4:], 'encapsulation 0007 is not'),
-        (WHOLE[:-1], 'requires a buffer of at least'),
-        (WHOLE[:12] + struct.pack('<I', 4000) + WHOLE[16:], 'string length 4000'),
-    ],
-    ids=['CDR2', 'cut', 'long frame'],
-)
-def test_messages_of_drivers_that_cannot_be_read_are_refused(bench, merge, data, reason):
-    bench.give(WRENCH, data, 1)
-    assert merge.refused == {'/leg_1/wrench': 1}
-    bench.clock(1_000 * MS)
-    assert reason in bench.statuses('refused messages')[-1][1].message
-    bench.give(WRENCH, wrench(5_000 * MS + 6, (1.0, 2.0, 3.0)), 1)
-    assert joins(bench) == [1.0, 2.0, 3.0, 0.0]
 
 
 def test_a_clock_that_cannot_be_read_is_refused(bench):

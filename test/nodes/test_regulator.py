@@ -5,12 +5,11 @@ import dataclasses
 import functools
 import math
 import re
-from functools import partial
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import AMBIENT, MS, SECOND, command, overrides
+from helpers import MS, SECOND, Device, command, overrides
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import SetParameters
@@ -25,9 +24,8 @@ from ros_pad.control.faults import Kind
 from ros_pad.errors import ConfigError, TransportError
 from ros_pad.nodes import regulator as module
 from ros_pad.nodes.regulator import RegulatorNode
-from ros_pad.regulators import BACKENDS, Reading, SimulatedRegulator
+from ros_pad.regulators import BACKENDS, SimulatedRegulator
 from ros_pad.regulators.channel import SupervisedChannel
-from ros_pad.regulators.protocol import permitted
 
 ERROR, WARN, OK, STALE = (
     getattr(DiagnosticStatus, each) for each in ('ERROR', 'WARN', 'OK', 'STALE')
@@ -98,48 +96,6 @@ def robot(bench):
     return Robot(bench)
 
 
-class Device:
-    """A device whose cable may break."""
-
-    made = ()
-
-    def __init__(self, ceiling, port='usb'):
-        self.ceiling = ceiling
-        self.port = port
-        self.setpoint = 40e3  # of an earlier user
-        self.is_open = False
-        self.broken = None
-        self.reads = None  # pressure that is read, if not the set-point
-        self.faults = ()
-        Device.made = (*Device.made, self)
-
-    def open(self):
-        if self.port == 'none':
-            raise TransportError("no such port: 'none'")
-        self.is_open = True
-
-    def set_pressure(self, gauge_pa):
-        self.setpoint = permitted(gauge_pa, self.ceiling)
-        self._answer()  # when the cable is broken, only the answer is lost
-
-    def read(self):
-        self._answer()
-        pressure = self.setpoint if self.reads is None else self.reads
-        return Reading(pressure, self.setpoint, self.faults, 0.0)
-
-    def vent(self):
-        self._answer()
-        self.setpoint = 0.0
-
-    def close(self):
-        self.is_open = False
-
-    def _answer(self):
-        assert self.is_open
-        if self.broken:
-            raise self.broken
-
-
 @pytest.fixture
 def devices(monkeypatch):
     """Make ``device`` a backend; return a function that returns its devices in order of legs."""
@@ -202,8 +158,6 @@ def test_a_row_that_is_missing_or_invalid_concerns_its_leg_only(robot, missing):
 REFUSED = {
     'stale': ({'age': 7.0}, 50e3, r'stamp of the set-point is [7-9]\S* s old: at most 5 s'),
     'future': ({'age': -90.0}, 50e3, r'stamp of the set-point is \S+ s in the future: at most 5'),
-    'negative': ({}, 50e3 - AMBIENT, r'set-point -51325.0 Pa is not allowed'),
-    'infinite': ({}, math.inf, r'set-point inf Pa is not allowed: a number from 0 to 80000 Pa'),
     'above the ceiling': (
         {}, 80001.0, r'set-point 80001 Pa is refused: it is above the ceiling of 80000',
     ),
@@ -223,16 +177,6 @@ def test_a_bad_setpoint_is_refused_and_reported(robot, devices, case):
     assert re.match(message, status.message)
     assert {each.key: each.value for each in status.values}['set-points refused'] == '1'
     assert robot.reported('leg 2', WARN) is None
-
-
-def test_pressure_stays_below_the_ceiling(robot):
-    """Steps go up to the ceiling, which is allowed, and down; one is above it."""
-    robot.start(ceiling=80e3)
-    for gauge in (80e3, 0.0, 80e3, 95e3, 80e3, 20e3, 80e3):
-        robot.hold(0.4, gauge, NONE)
-    assert robot.counts() == (120, 20)
-    # At a damping ratio of 0.9 the overshoot is exp(-pi 0.9/sqrt(1 - 0.81)) = 0.15 % of a step.
-    assert 79e3 < robot.pressures[:, 0]['pressure'].max() <= 80e3 * 1.0016
 
 
 def test_a_vent_lasts_until_the_next_activation(robot):
@@ -340,13 +284,12 @@ def test_every_end_vents_and_the_log_has_the_reason(robot, devices, monkeypatch,
     assert f'leg 1: {ENDS[end]}' in capfd.readouterr().err
 
 
-@pytest.mark.parametrize('error', [partial(TransportError, 'cable'), partial(OSError, 5, 'cable')])
-def test_a_broken_cable_does_not_keep_the_other_pads_up(robot, devices, error):
+def test_a_broken_cable_does_not_keep_the_other_pads_up(robot, devices):
     robot.start(simulated=False, backend='device')
     robot.send(50e3, 50e3)
     first, second = devices()
     real_read, first.read = first.read, second.read  # only commands are lost
-    first.broken = error()
+    first.broken = OSError(5, 'cable')
     answer = robot.vent()
     assert not answer.success
     assert 'leg 1' in answer.message
@@ -435,46 +378,6 @@ def test_options_overrule_hose_and_faults_of_a_scene(robot, options, tmp_path):
     assert (fault.kind, fault.start, fault.conductance) == ('leak', 1.5, 1e-9)
 
 
-# Fault of leg 1, and first words of its report.
-FAULTS = {
-    'leak': ('{kind: leak, legs: [1], start: 1.5, conductance: 1.0e-8}', 'sags: '),
-    'silence': (
-        '{kind: silence, legs: [1], start: 1.5, end: 2.4}',
-        'the simulated regulator does not answer',
-    ),
-}
-
-
-@pytest.mark.parametrize('case', FAULTS)
-def test_each_fault_is_reported_within_a_second(robot, case):
-    fault, words = FAULTS[case]
-    robot.start(**{'backend_options.faults': [fault]})
-    for gauge, seconds in ((0.0, 1.0), (60e3, 1.2), (0.0, 1.1)):
-        robot.hold(seconds, gauge, gauge)
-    at, message = robot.reported('leg 1')
-    assert 1.5 <= at <= 2.5
-    assert message.startswith(words)
-    assert robot.reported('leg 2') is None
-    assert robot.reported('supply') is None  # one pad shows no loss of supply
-    if case != 'silence':
-        assert robot.counts()[1] == 0  # the fault is only reported
-    rows = robot.pressures[:, 0]
-    assert np.isnan(rows['pressure']).any() == (case == 'silence')
-
-
-def test_a_low_supply_has_a_status_of_its_own(robot):
-    robot.start(**{'backend_options.faults': ['{kind: supply_loss, start: 1.0}']})
-    robot.hold(2.8, 60e3, 50e3)
-    at, message = robot.reported('supply')
-    # The supply falls from 100 kPa with a time constant of 1 s: to 60 kPa in 0.51 s, 50 in 0.69 s.
-    assert 1.69 < at <= 2.69
-    assert message == 'the supply of air is low: pads of legs 1, 2 are below their set-points'
-    assert robot.reported('leg 2')
-    assert [s.name for s in robot.bench.heard(topics.DIAGNOSTICS)[0].status] == [
-        'regulator: leg 1 regulator', 'regulator: leg 2 regulator', 'regulator: supply',
-    ]  # fmt: skip
-
-
 def test_diagnostics_of_sound_pads_come_each_second_and_when_commands_stop(robot):
     robot.start()
     for one, two, seconds in ((60e3, 0.0, 0.5), (0.0, 88e3, 0.5), (90e3, 20e3, 1.0), (0, 90e3, 1)):
@@ -489,30 +392,7 @@ def test_diagnostics_of_sound_pads_come_each_second_and_when_commands_stop(robot
     ]  # fmt: skip
 
 
-def test_a_faulty_pad_is_held_until_the_node_is_activated_again(robot, capfd):
-    leak = '{kind: leak, legs: [1], start: 1.0, end: 2.5, conductance: 1.0e-8}'
-    robot.start(on_fault='vent', **{'backend_options.faults': [leak]})
-    robot.hold(2.0, 60e3, 40e3)
-    assert robot.device().read().setpoint == 0.0
-    assert robot.gauge(2) == pytest.approx(40e3, abs=500.0)
-    accepted, refused = robot.counts()
-    assert 0 < refused == 100 - accepted
-    assert robot.pressures[-1]['fault'][0] == Kind.SAGS.code
-    assert robot.reported('leg 1')[1].startswith('sags: ')
-    assert 'vented until' in robot.bench.statuses('leg 1')[-1][1].message
-    assert 'leg 1: vented: sags: ' in capfd.readouterr().err
-    robot.hold(0.5, 60e3, 40e3)  # the leak has ended, but the pad is held
-    assert robot.gauge() < 1e3
-    assert robot.vent().success
-    assert robot.transit('activate')
-    robot.bench.sent.clear()
-    robot.hold(1.0, 60e3, 40e3)
-    assert robot.gauge() == pytest.approx(60e3, abs=500.0)
-    assert robot.reported('leg 1', OK)
-    assert robot.reported('leg 1') is None
-
-
-@pytest.mark.parametrize('timeout', [0.03, 0.05, 0.3])
+@pytest.mark.parametrize('timeout', [0.03, 0.3])
 def test_the_clock_vents_at_the_timeout(robot, timeout):
     """In simulated time, too, where records are the moments of all else."""
     robot.start(command_timeout=timeout)

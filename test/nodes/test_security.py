@@ -6,38 +6,10 @@ import pathlib
 import xml.etree.ElementTree
 
 import pytest
-from helpers import SIX, overrides
+from helpers import NODES, SIX, node_class, overrides
 from rclpy.node import Node
 
-from ros_pad.nodes.body_estimator import BodyEstimatorNode
-from ros_pad.nodes.controller import ControllerNode
-from ros_pad.nodes.estimator import EstimatorNode
-from ros_pad.nodes.merge import MergeNode
-from ros_pad.nodes.recorder import RecorderNode
-from ros_pad.nodes.regulator import RegulatorNode
-from ros_pad.nodes.simulator import SimulatorNode
-from ros_pad.nodes.views import ViewsNode
-
 POLICY = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'security' / 'policy.xml'
-NODES = {
-    'regulator': RegulatorNode,
-    'body_estimator': BodyEstimatorNode,
-    'estimator': EstimatorNode,
-    'controller': ControllerNode,
-    'simulator': SimulatorNode,
-    'merge': MergeNode,
-    'views': ViewsNode,
-    'recorder': RecorderNode,
-}
-OWN = {
-    'simulator': {
-        'scene': 'hexapod_patches',
-        'publish_clock': True,
-        'fidelity': 'L1',
-    },
-    'recorder': {},
-}
-SERVING = [name for name in NODES if name != 'recorder']
 # Allowed, but not always used: joints exist at L2 only, the clock in simulated time only.
 AT_TIMES = {
     ('simulator', 'publish', '/joint_states'),
@@ -48,13 +20,7 @@ AT_TIMES = {
     ('merge', 'subscribe', '/leg_?/contact_velocity'),
     # With the first message of a driver:
     *(('merge', 'publish', f'/feet/{name}') for name in ('sample', 'force', 'pressure')),
-    *((name, 'subscribe', '/clock') for name in SERVING),
-    # The recorder requests parameters of the nodes that run.
-    *(
-        ('recorder', 'request', f'/{node}/{verb}_parameters')
-        for node in SERVING
-        for verb in ('list', 'get')
-    ),
+    *((name, 'subscribe', '/clock') for name in NODES),
 }
 
 
@@ -78,18 +44,15 @@ def allowed():
 
 @pytest.mark.parametrize('name', NODES)
 def test_the_policy_names_what_a_node_has_and_no_more(context, executor, until, tmp_path, name):
-    parameters = {'legs': list(SIX), 'use_sim_time': name == 'regulator'}
-    parameters = OWN.get(name, parameters)
+    values = {'legs': list(SIX), 'use_sim_time': name == 'regulator'}
+    if name == 'simulator':
+        values |= {'publish_clock': True, 'fidelity': 'L1'}
     if name == 'recorder':
-        parameters = {'legs': list(SIX), 'folder': str(tmp_path / 'bag')}
-    node = NODES[name](
-        context=context,
-        parameter_overrides=overrides(parameters),
-    )
+        values |= {'folder': str(tmp_path / 'bag')}
+    node = node_class(name)(context=context, parameter_overrides=overrides(values))
     executor.add_node(node)
     observer = Node('observer', context=context, start_parameter_services=False)
     executor.add_node(observer)
-    until(lambda: f'/{name}/get_parameters' in dict(observer.get_service_names_and_types()))
 
     def live():
         """Return names and types of the node's topics and services, as other nodes see them."""
@@ -100,6 +63,7 @@ def test_the_policy_names_what_a_node_has_and_no_more(context, executor, until, 
             'request': observer.get_client_names_and_types_by_node(name, '/'),
         }
 
+    until(lambda: name in observer.get_node_names(), what='the node')
     own = len(list(node.publishers)) + len(list(node.subscriptions)) + len(list(node.services))
     until(lambda: sum(map(len, live().values())) >= own - 2, what='the whole node')
     policy = allowed()
@@ -127,10 +91,4 @@ def test_only_the_controller_may_move_pads_and_only_an_operator_may_call():
     assert movers('/feet/command') == {'controller'}
     assert movers('/leg_3/pressure_setpoint') == {'views'}  # for regulators of others
     assert movers('/feet/pressure') == {'regulator', 'merge'}
-    asking = {name for name, kind in policy if kind == 'request'}
-    assert asking == {'operator', 'recorder'}
-    # The recorder may read parameters, and no more.
-    assert all(
-        each.endswith(('/list_parameters', '/get_parameters'))
-        for each in policy['recorder', 'request']
-    )
+    assert {name for name, kind in policy if kind == 'request'} == {'operator'}

@@ -10,16 +10,17 @@ import sys
 import time
 
 import pytest
+from helpers import wait_for
 
 from ros_pad.bags import BagReader
 
 NODES = ('recorder', 'regulator', 'estimator', 'controller', 'simulator')
 SCRIPTS = pathlib.Path(sys.executable).parent
-FORMS = {
-    'script': lambda name: [str(SCRIPTS / f'{name}_node')],
-    'module': lambda name: [sys.executable, '-m', f'ros_pad.nodes.{name}'],
-}
 WALK = ('run', 'hexapod_patches', '--policy', 'dome', '--cycles', '30', '--out', 'out')
+
+
+def script(name):
+    return str(SCRIPTS / f'{name}_node')
 
 
 def handles_signals(child):
@@ -36,16 +37,9 @@ def start(tmp_path):
 
     def start(*commands):
         for words in commands:
-            children.append(
-                subprocess.Popen(
-                    words,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.PIPE,
-                    text=True,
-                    cwd=tmp_path,
-                    process_group=children[0].pid if children else 0,
-                )
-            )
+            group = children[0].pid if children else 0
+            pipes = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.PIPE, 'text': True}
+            children.append(subprocess.Popen(words, cwd=tmp_path, process_group=group, **pipes))
         wait_for(lambda: all(handles_signals(each) for each in children))
         return children
 
@@ -53,13 +47,6 @@ def start(tmp_path):
     for child in children:
         child.kill()
         child.communicate()
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
 
 
 def ends(children):
@@ -70,10 +57,9 @@ def ends(children):
     return [child.returncode for child in children]
 
 
-@pytest.mark.parametrize('form', FORMS)
 @pytest.mark.parametrize('after', [0.0, 0.2])
-def test_two_signals_during_the_imports_of_the_nodes(form, after, start):
-    children = start(*(FORMS[form](name) for name in NODES))
+def test_two_signals_during_the_imports_of_the_nodes(after, start):
+    children = start(*([script(name)] for name in NODES))
     time.sleep(after)
     for child, number in itertools.product(children, (signal.SIGINT, signal.SIGTERM)):
         child.send_signal(number)
@@ -83,7 +69,7 @@ def test_two_signals_during_the_imports_of_the_nodes(form, after, start):
 def test_two_signals_to_a_group_of_nodes_as_from_launch(start, tmp_path):
     """The group gets SIGINT, and then each node another one, as from launch without a terminal."""
     recorder = ['--ros-args', '-p', 'folder:=bag']
-    children = start(*(FORMS['script'](x) + recorder * (x == 'recorder') for x in NODES))
+    children = start(*([script(name), *recorder * (name == 'recorder')] for name in NODES))
     wait_for((tmp_path / 'bag' / 'metadata.yaml').exists)
     os.killpg(children[0].pid, signal.SIGINT)
     for child in children:

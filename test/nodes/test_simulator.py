@@ -3,6 +3,7 @@
 
 import math
 import types
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from ros_pad.nodes.simulator import HIGHEST, SimulatorNode
 from ros_pad.records import PRESSURE
 
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
-STEPPED = {'use_sim_time': False, 'free_running': False, 'publish_clock': True}
+STEPPED = {'use_sim_time': False, 'publish_clock': True}
 REAL = {'use_sim_time': False}
 END_NS = 10**15
 
@@ -26,9 +27,9 @@ def start(bench):
     """Return a function that starts a simulator which the test steps."""
 
     def start(**parameters):
-        bench.sent.clear()
-        node = bench.start(SimulatorNode, **(STEPPED | parameters))
+        node = bench.start(partial(SimulatorNode, False), **(STEPPED | parameters))
         bench.legs = tuple(node.scene.legs)
+        bench.sent.clear()
         return node
 
     return start

@@ -4,13 +4,11 @@
 import math
 
 import pytest
-from helpers import AMBIENT, LOAD, MS, encoded, estimate, nanoseconds, overrides, record
-from rclpy.node import Node
+from helpers import AMBIENT, LOAD, MS, estimate, nanoseconds, record
 from visualization_msgs.msg import Marker
 
 from ros_pad.bags import topics
 from ros_pad.estimation import doubt as doubts
-from ros_pad.nodes import qos
 from ros_pad.nodes.views import SHOWN, ViewsNode
 from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE
 
@@ -91,19 +89,6 @@ def test_texts_are_published_when_they_change(bench):
     assert said(topics.LEG_DOUBT, 2) == ['']
     assert said(topics.LEG_MORPHOLOGY, 1) == ['flat', 'dome', 'flat']
     assert said(topics.LEG_MORPHOLOGY, 2) == []
-
-
-def test_texts_reach_who_comes_late(context, executor, until):
-    """Only the views are in DDS here; a record is handed to their subscription."""
-    views = ViewsNode(context=context, parameter_overrides=overrides({'legs': [1]}))
-    late, heard = Node('late', context=context), []
-    for node in (views, late):
-        executor.add_node(node)
-    (take,) = [each.callback for each in views.subscriptions if 'command' in each.topic_name]
-    take(encoded(topics.COMMAND, record(COMMAND, 1, 1, dome=1.0), (1,)))
-    qos.subscription(late, topics.LEG_MORPHOLOGY, heard.append, 1)
-    until(lambda: heard, what='the latched morphology')
-    assert [each.data for each in heard] == ['dome']
 
 
 def test_markers_show_the_feet_in_colours_of_their_wetness(bench):
