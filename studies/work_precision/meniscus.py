@@ -2,8 +2,7 @@
 """Work-precision study of the meniscus: liquid bridges, and the ring around a pressed dome.
 
 The reference is computed differently from :mod:`ros_pad.contact`: by shooting along the meridian
-with 12 digits. It is followed from a gap so narrow that the meridian is a circle, and from zero
-gravity to that of the earth.
+with 12 digits. It is followed from a gap so narrow that the meridian is a circle.
 """
 
 from __future__ import annotations
@@ -37,9 +36,8 @@ from studies.work_precision.comparison import Method, Problem, Result, chart, ru
 
 # The sphere is the dome of the large pad at 75 kPa; the liquid is water.
 RADIUS = inflate(LARGE_PAD, 75e3).sphere_radius
-_TENSION, _DENSITY = WATER.surface_tension, WATER.density
+_TENSION = WATER.surface_tension
 _UNIT = RADIUS * _TENSION  # unit of force, N
-_BOND = _DENSITY * GRAVITY * RADIUS**2 / _TENSION
 SHOOTING = 'shooting, start at the circle'
 
 # The sample: contact angle and filling angle, degrees, and separation in radii.
@@ -59,20 +57,19 @@ CORNERS = (
 
 
 def measure(progress: Progress) -> list[Result]:
-    """Measure bridges without gravity, bridges with gravity, and the ring.
+    """Measure bridges and the ring.
 
     Progress, 0 to 1, is reported to ``progress``.
     """
-    problem, volumes = bridge_problem(0.0, lambda share: progress(0.3 * share))
+    problem, volumes = bridge_problem(lambda share: progress(0.6 * share))
     methods = _bridge_methods(volumes)
-    light = run(problem, methods, SHOOTING, lambda done: progress(0.3 + 0.2 * done / len(methods)))
-    problem, volumes = bridge_problem(GRAVITY, lambda share: progress(0.5 + 0.3 * share))
-    methods = _heavy_methods(volumes)
-    heavy = run(problem, methods, SHOOTING, lambda done: progress(0.8 + 0.1 * done / len(methods)))
+    bridges = run(
+        problem, methods, SHOOTING, lambda done: progress(0.6 + 0.3 * done / len(methods))
+    )
     problem = ring_problem(lambda share: progress(0.9 + 0.05 * share))
     rings = run(problem, RING_METHODS, BATH, lambda done: progress(0.95 + 0.01 * done))
     progress(1.0)
-    return light + heavy + rings
+    return bridges + rings
 
 
 def figures(results: list[Result], progress: Progress | None = None) -> dict[str, Figure]:
@@ -85,17 +82,13 @@ def figures(results: list[Result], progress: Progress | None = None) -> dict[str
 Case = tuple[float, float, float]
 
 
-def bridge_problem(gravity: float, progress: Progress) -> tuple[Problem, dict[Case, float]]:
-    """Return the sample of bridges with the force on the sphere, and the volume of each, m³.
-
-    Bridges without a reference, because gravity breaks them, are left out.
-    """
-    bond = _BOND * gravity / GRAVITY
+def bridge_problem(progress: Progress) -> tuple[Problem, dict[Case, float]]:
+    """Return the sample of bridges with the force on the sphere, and the volume of each, m³."""
     cases, forces, volumes, ordinary = [], [], {}, []
     sample = ORDINARY + CORNERS
     for number, (theta, beta, gap) in enumerate(sample):
         case = (math.radians(theta), math.radians(beta), gap * RADIUS)
-        found = followed(case[0], case[1], gap, bond)
+        found = followed(case[0], case[1], gap)
         progress((number + 1) / len(sample))
         if found is None:
             continue
@@ -105,7 +98,7 @@ def bridge_problem(gravity: float, progress: Progress) -> tuple[Problem, dict[Ca
         ordinary.append(number < len(ORDINARY))
     angles, fillings, gaps = np.array(cases).T
     inputs = {'contact_angle_rad': angles, 'filling_angle_rad': fillings, 'separation_m': gaps}
-    name = 'bridge, force on the sphere' + (', with gravity' if gravity else '')
+    name = 'bridge, force on the sphere'
     return Problem(name, inputs, np.array(forces), np.array(ordinary), wrong=0.1), volumes
 
 
@@ -129,25 +122,23 @@ class Shot:
     length: float
 
 
-def followed(theta: float, beta: float, gap: float, bond: float = 0.0) -> Shot | None:
-    """Return the bridge by continuation from a narrow gap without gravity; None if that fails.
+def followed(theta: float, beta: float, gap: float) -> Shot | None:
+    """Return the bridge by continuation from a narrow gap; None if that fails.
 
     ``theta`` is the contact angle on sphere and plane, ``beta`` the filling angle, rad; ``gap`` is
-    in radii of the sphere; ``bond`` is density gravity radius² / tension.
+    in radii of the sphere.
     """
     height, edge = gap + 2.0 * math.sin(0.5 * beta) ** 2, math.sin(beta)
     least = min(height, 0.1 * edge)
     steps = np.geomspace(least, height, 1 + math.ceil(math.log(height / least) / 0.3))
     shot = None
     for each in steps:
-        shot = _shoot(theta, beta, float(each), 0.0, 1e-12, shot)
-    for weight in np.linspace(0.0, bond, 5)[1:] if bond else ():
-        shot = shot and _shoot(theta, beta, height, float(weight), 1e-12, shot)
+        shot = _shoot(theta, beta, float(each), 1e-12, shot)
     return shot
 
 
 def _shoot(
-    theta: float, beta: float, height: float, bond: float, rtol: float, start: Shot | None
+    theta: float, beta: float, height: float, rtol: float, start: Shot | None
 ) -> Shot | None:
     """Return the meridian near a start, by default the circle; None if none is found."""
     edge, end, begin = math.sin(beta), beta + theta, math.pi - theta
@@ -163,9 +154,9 @@ def _shoot(
         """Return radius, height, inclination and volume at the end of the path, on the plane."""
 
         def rates(_: float, state: Array) -> tuple[float, float, float, float]:
-            r, z, phi, _ = state.tolist()
+            r, _, phi, _ = state.tolist()
             sine = math.sin(phi)
-            bend = pressure - bond * z - sine / r
+            bend = pressure - sine / r
             return -math.cos(phi), -sine, -bend, math.pi * r * r * sine
 
         solved = solve_ivp(
@@ -198,21 +189,15 @@ def _shoot(
         return None
     _, _, _, under = path(pressure, length)
     cap = math.pi / 3.0 * (1.0 - math.cos(beta)) ** 2 * (2.0 + math.cos(beta))
-    force = (
-        math.pi * (2.0 * edge * math.sin(end) - edge**2 * (pressure - bond * height)) - bond * cap
-    )
+    force = math.pi * (2.0 * edge * math.sin(end) - edge**2 * pressure)
     return Shot(force, float(under) - cap, pressure, length)
 
 
-def _shooting(bond: float) -> Callable[[float, float, float], float]:
-    """Return a simple shooting method: 8 digits, from the circle, without continuation."""
-
-    def solve(theta: float, beta: float, gap: float) -> float:
-        height = gap / RADIUS + 2.0 * math.sin(0.5 * beta) ** 2
-        shot = _shoot(theta, beta, height, bond, 1e-8, None)
-        return math.nan if shot is None else shot.force * _UNIT
-
-    return solve
+def _shooting(theta: float, beta: float, gap: float) -> float:
+    """Return the force by simple shooting: 8 digits, from the circle, without continuation."""
+    height = gap / RADIUS + 2.0 * math.sin(0.5 * beta) ** 2
+    shot = _shoot(theta, beta, height, 1e-8, None)
+    return math.nan if shot is None else shot.force * _UNIT
 
 
 def _small_bridge(theta: Array, beta: Array, gap: Array) -> Array:
@@ -221,50 +206,20 @@ def _small_bridge(theta: Array, beta: Array, gap: Array) -> Array:
     return 4.0 * math.pi * _UNIT * np.cos(theta) / (1.0 + gap / height)
 
 
-def _circle(theta: Array, beta: Array, gap: Array) -> Array:
-    found = bridge(RADIUS, _TENSION, theta, filling_angle=beta, separation=gap, method='circle')
-    return np.asarray(found.force)[()]
-
-
-def _exact(gravity: float) -> Callable[[float, float, float], float]:
-    def solve(theta: float, beta: float, gap: float) -> float:
-        known: dict[str, Any] = {'separation': gap, 'gravity': gravity, 'density': _DENSITY}
-        known |= {'filling_angle': beta, 'method': 'young_laplace'}
-        return float(bridge(RADIUS, _TENSION, theta, **known).force)
-
-    return solve
-
-
-def _by_volume(
-    volumes: dict[Case, float], method: str, gravity: float
-) -> Callable[[float, float, float], float]:
-    def solve(theta: float, beta: float, gap: float) -> float:
-        known: dict[str, Any] = {'separation': gap, 'gravity': gravity, 'density': _DENSITY}
-        known |= {'volume': volumes[theta, beta, gap], 'method': method}
-        return float(bridge(RADIUS, _TENSION, theta, **known).force)
-
-    return solve
+def _exact(theta: float, beta: float, gap: float) -> float:
+    return bridge(RADIUS, _TENSION, theta, filling_angle=beta, separation=gap).force
 
 
 def _bridge_methods(volumes: dict[Case, float]) -> tuple[Method, ...]:
+    def by_volume(theta: float, beta: float, gap: float) -> float:
+        volume = volumes[theta, beta, gap]
+        return bridge(RADIUS, _TENSION, theta, volume=volume, separation=gap).force
+
     return (
         Method('4 π γ R cos θ, batch', _small_bridge, batch=True),
-        Method('circle', _circle, ours=True),
-        Method('circle, batch', _circle, batch=True, ours=True),
-        Method('circle, by volume', _by_volume(volumes, 'circle', 0.0), ours=True),
-        Method(SHOOTING, _shooting(0.0)),
-        Method('exact', _exact(0.0), ours=True),
-        Method('exact, by volume', _by_volume(volumes, 'young_laplace', 0.0), ours=True),
-    )
-
-
-def _heavy_methods(volumes: dict[Case, float]) -> tuple[Method, ...]:
-    return (
-        Method('circle, batch', _circle, batch=True, ours=True),
-        Method(SHOOTING, _shooting(_BOND)),
-        Method('exact, without gravity', _exact(0.0), ours=True),
-        Method('exact', _exact(GRAVITY), ours=True),
-        Method('exact, by volume', _by_volume(volumes, 'young_laplace', GRAVITY), ours=True),
+        Method(SHOOTING, _shooting),
+        Method('exact', _exact, ours=True),
+        Method('exact, by volume', by_volume, ours=True),
     )
 
 

@@ -6,7 +6,6 @@ import pathlib
 import pytest
 
 from ros_pad.contact import Liquid, bridge
-from ros_pad.errors import NoBridge
 from studies.work_precision import comparison, meniscus
 
 pytestmark = pytest.mark.slow
@@ -38,18 +37,12 @@ def test_truth_of_the_bridge_is_that_of_the_reference_table():
         assert found.pressure == pytest.approx(row['dpR_over_gamma'], rel=1e-10)
 
 
-@pytest.mark.parametrize(('bond', 'share'), [(0.0, 1), (0.5, 3), (5.0, 5)])
-def test_corners_are_on_the_branch_that_begins_with_a_narrow_gap(bond, share):
+def test_corners_are_on_the_branch_that_begins_with_a_narrow_gap():
     """Bridges of ``bridge`` are the same as those on the branch that is followed."""
-    for theta, beta, gap in meniscus.CORNERS[::share]:
+    for theta, beta, gap in meniscus.CORNERS:
         angles = math.radians(theta), math.radians(beta)
-        truth = meniscus.followed(*angles, gap, bond)
-        known = {'separation': gap, 'gravity': bond, 'density': 1.0, 'method': 'young_laplace'}
-        if truth is None:
-            with pytest.raises(NoBridge):
-                bridge(1.0, 1.0, angles[0], filling_angle=angles[1], **known)
-            continue
-        found = bridge(1.0, 1.0, angles[0], filling_angle=angles[1], **known)
+        truth = meniscus.followed(*angles, gap)
+        found = bridge(1.0, 1.0, angles[0], filling_angle=angles[1], separation=gap)
         assert found.force == pytest.approx(truth.force, rel=1e-10)
         assert found.volume == pytest.approx(truth.volume, rel=1e-10)
 
@@ -77,7 +70,7 @@ def test_exact_methods_are_exact_and_never_fail(results):
         for (_, method), result in results.items()
         if method in ('exact', 'exact, by volume')
     ]
-    assert len(exact) == 4
+    assert len(exact) == 2
     for result in exact:
         assert result.failures == 0
         assert result.error < 1e-10
@@ -86,12 +79,8 @@ def test_exact_methods_are_exact_and_never_fail(results):
 
 
 def test_approximations_are_off_and_reported(results):
-    light = 'bridge, force on the sphere'
-    assert 0.001 < results[light, 'circle'].median_error < 0.05
-    assert results[light, 'circle'].wrong > 0  # more than 10 % wrong for wide bridges
-    assert results[light, '4 π γ R cos θ, batch'].wrong >= results[light, 'circle'].wrong
-    without = results[light + ', with gravity', 'exact, without gravity']
-    assert 1e-8 < without.median_error < 1e-2
+    # More than 10 % wrong for wide bridges.
+    assert results['bridge, force on the sphere', '4 π γ R cos θ, batch'].wrong > 0
     # On a dome smaller than the capillary length a wedge with a straight edge is a bad model.
     ring = 'ring round a pressed dome, height'
     for method in ('thesis, 3.80', 'corrected'):
