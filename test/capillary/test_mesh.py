@@ -118,28 +118,6 @@ def test_broken_meshes_are_refused(points, faces, part: str):
     assert str(error.value).startswith('changed: ')
 
 
-def test_bodies_that_overlap_are_refused():
-    one = Mesh.dome(R, B, rings=6, sectors=12)
-    points = np.concatenate([one.points, one.points + np.array([0.5e-3, 0.0, 0.0])])
-    faces = np.concatenate([one.faces, one.faces + len(one.points)])
-    with pytest.raises(MeshError, match=r'^changed: bodies overlap at \(.*\) m$'):
-        changed(points, faces)
-    one = CUBE_POINTS * [1.0, 1.0, 0.5] + [0.0, 0.0, 1e-3]  # on top of the cube
-    faces = np.concatenate([CUBE_FACES, 8 + CUBE_FACES])
-    assert changed(np.concatenate([CUBE_POINTS, one]), faces).volume == pytest.approx(1.5e-9)
-    within = 0.5 * CUBE_POINTS + 0.25e-3
-    with pytest.raises(MeshError, match='changed: bodies overlap at'):
-        changed(np.concatenate([CUBE_POINTS, within]), faces)
-
-
-def test_a_body_that_cuts_itself_is_refused():
-    cylinder = Mesh.cylinder(1e-3, 2e-3, sectors=12)
-    points = cylinder.points.copy()
-    points[-1] = [2e-3, 0.1e-3, 1e-3]  # the middle of the top, moved out through the wall
-    with pytest.raises(MeshError, match=r'^changed: the mesh cuts itself at \(.*\) m$'):
-        changed(points, cylinder.faces)
-
-
 def test_what_files_miss_the_floor_by_is_taken_off():
     for low in (-5e-9, 5e-9):
         mesh = changed(CUBE_POINTS + np.array([0, 0, low]))
