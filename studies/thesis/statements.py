@@ -9,7 +9,7 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from ros_pad.capillary import bath_meniscus
+from ros_pad.capillary import Wall, bath_meniscus
 from ros_pad.contact.dome import inflate, press
 from ros_pad.contact.film import Film
 from ros_pad.contact.limits import force_limit, largest_pressure, resized
@@ -64,7 +64,7 @@ def _ring() -> tuple[Claim, ...]:
     ring, height = np.asarray(right.ring_radius), np.asarray(right.height)
     wrong = (2.0 * ring + height) / (2.0 * ring - height)
     domes = zip(np.asarray(pressed.sphere_radius).tolist(), b.tolist(), strict=True)
-    exact = np.array([bath_meniscus(*dome, liquid=WATER).height for dome in domes])
+    exact = np.array([bath_meniscus(Wall.dome(*dome), WATER).height for dome in domes])
     off, share = np.asarray(printed.height) / exact, b / ring
     return (
         claim('a ring of liquid', 0.0, False),

@@ -285,7 +285,7 @@ def run(shape: Shape, progress: Progress) -> list[Row]:
     ]
 
     def meniscus(liquid: Liquid) -> Any:
-        return bath_meniscus(wall=shape.wall, liquid=liquid)
+        return bath_meniscus(shape.wall, liquid)
 
     methods.append((EXACT, '', meniscus, slice(None)))
     results = []
@@ -399,7 +399,7 @@ def traps() -> list[Row]:
     for balance in BALANCES:
         answer = outcome(lambda b=balance: wet(low.mesh(48, 72), wetting, b))  # type: ignore[misc]
         rows.append(trap(balance, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
-    answer = outcome(lambda: bath_meniscus(wall=low.wall, liquid=wetting))
+    answer = outcome(lambda: bath_meniscus(low.wall, wetting))
     rows.append(trap(EXACT, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
     answer = outcome(lambda: wet_surface(low.wall, wetting, sectors=12, refinements=0))
     rows.append(trap('minimised', 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))

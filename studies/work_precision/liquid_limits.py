@@ -132,7 +132,7 @@ def pads() -> Iterator[Case]:
             base = radius * LENGTH
             for share in SHARES:
                 top = (math.sqrt(1.0 - share**2) + 0.95) * base
-                found = bath_meniscus(base, share * base, liquid=liquid)
+                found = bath_meniscus(Wall.dome(base, share * base), liquid)
                 if found.height > 0.0:
                     mesh = Mesh.dome(base, share * base, top, 64, 32)
                     yield Case(mesh, liquid, found.height)
@@ -140,7 +140,7 @@ def pads() -> Iterator[Case]:
                 lean = 1.0 / math.tan(math.radians(slope))
                 longest = 2.5 * LENGTH if lean > -1e-9 else min(2.5 * LENGTH, -0.98 * base / lean)
                 wall = Wall.cone(base, math.radians(slope), longest)
-                found = bath_meniscus(wall=wall, liquid=liquid)
+                found = bath_meniscus(wall, liquid)
                 if found.height > 0.0:
                     height = min(longest, 3.2 * found.height + 1e-5)
                     mesh = Mesh.cone(base, base + height * lean, height, 24, 32)
