@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -234,7 +234,7 @@ def ring_problem(progress: Progress) -> Problem:
     """Return pressed domes, from barely touching to nearly flat, with the height of their ring."""
     pressures, shares = (grid.ravel() for grid in np.meshgrid(PRESSURES, SHARES))
     forces = shares * np.array([force_limit(LARGE_PAD, p, 'flattening') for p in pressures])
-    domes = press(LARGE_PAD, pressures, forces, adhesion='none')
+    domes = press(replace(LARGE_PAD, adhesion_energy=0.0), pressures, forces)
     heights = []
     for contact, sphere in zip(domes.contact_radius, domes.sphere_radius, strict=True):
         heights.append(bath(float(contact), float(sphere), 1e-11))

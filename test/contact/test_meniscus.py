@@ -27,6 +27,7 @@ from ros_pad.errors import InvalidInput
 REFERENCES = pathlib.Path(__file__).parent.parent / 'reference'
 REFERENCE = REFERENCES / 'meniscus_thesis.json'
 APPENDIX_PI = math.pi / 3.1415  # see test_dome.py
+BARE = dataclasses.replace(LARGE_PAD, adhesion_energy=0.0)
 
 
 # Appendix at 75 kPa: force, N; F_cap, mN, with the appendix' tensions and with those of water.
@@ -93,18 +94,18 @@ def test_corrected_height_carries_its_weight(pressure, share, theta):
 
 
 def test_no_contact_has_no_ring():
-    dome = press(LARGE_PAD, 75e3, 0.0, adhesion='none')
+    dome = press(BARE, 75e3, 0.0)
     for reading in ('corrected', 'thesis'):
         ring = meniscus(dome, WATER, reading)
         assert dataclasses.astuple(ring) == (0.0, 0.0, 0.0, 'no_contact')
 
 
 def test_arrays_carry_their_statuses():
-    dome = press(LARGE_PAD, [75e3, 75e3, 75e3, 120e3], [0.0, 0.1, 0.6, 0.1], adhesion='none')
+    dome = press(BARE, [75e3, 75e3, 75e3, 120e3], [0.0, 0.1, 0.6, 0.1])
     ring = meniscus(dome, WATER)
     assert ring.status.tolist() == ['no_contact', 'ok', 'flattened', 'fold_zone']
     assert ring.height[0] == 0
-    single = meniscus(press(LARGE_PAD, 75e3, 0.1, adhesion='none'), WATER)
+    single = meniscus(press(BARE, 75e3, 0.1), WATER)
     assert isinstance(single.height, float)
     assert ring.height[1] == pytest.approx(single.height, rel=1e-13)
     assert np.isnan(ring.tangential_force).tolist() == [False, False, True, True]
