@@ -18,8 +18,7 @@ from ros_pad.commands.folder import PICTURES, check_pictures, refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
 from ros_pad.contact import LARGE_PAD, Design, Foot, Material, design
-from ros_pad.contact.candidates import Candidate, candidates
-from ros_pad.contact.design import CELL
+from ros_pad.contact.design import CELL, Candidate, candidates
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, criteria, resized
 from ros_pad.errors import InvalidInput
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ros_pad.contact import Design, rise_height
-from ros_pad.contact.candidates import Candidate, Span
+from ros_pad.contact.design import Candidate, Span
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import write_picture
 from ros_pad.reports.style import BLACK, BLUE, VERMILION, WIDE

@@ -126,7 +126,7 @@ def test_exact_against_shooting(theta, plane, beta, gap, status):
         assert again.force == pytest.approx(found.force, rel=1e-6, abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.floats(0.0, 3.0),
     st.floats(0.0, 3.0),

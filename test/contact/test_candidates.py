@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact import Material
-from ros_pad.contact.candidates import candidates
+from ros_pad.contact.design import candidates
 from ros_pad.errors import InvalidInput
 
 RADIUS, THICKNESS = 1.5e-3, 4e-4

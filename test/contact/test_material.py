@@ -8,7 +8,7 @@ import pytest
 
 from ros_pad import configuration
 from ros_pad.capillary.coupling import press_wet
-from ros_pad.contact import WATER, Foot, Material, Pad, design, inflate
+from ros_pad.contact import WATER, Foot, Material, Pad, inflate
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.material import equibiaxial, tensions
 from ros_pad.errors import ConfigError, InvalidInput
@@ -242,7 +242,5 @@ def test_parameters_of_every_shipped_material_in_mpa_or_kpa_are_refused(unit):
 def test_what_needs_a_stiffness_refuses_a_material(tmp_path):
     pad = '{material: dragon_skin_10, radius: 1.5e-3, thickness: 0.4e-3}'
     foot = Foot.load(foot_file(tmp_path, pad))
-    with pytest.raises(InvalidInput, match='a design needs a pad with a measured stiffness'):
-        design(7.0, 1e-3, foot.pad)
     with pytest.raises(InvalidInput, match='a pad in a bath needs'):
         press_wet(foot.pad, 30e3, 0.1, WATER)
