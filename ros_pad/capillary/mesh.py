@@ -19,9 +19,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ros_pad.capillary.crossings import Indices, overlap
-from ros_pad.configuration import integer, number
+from ros_pad.configuration import integer, number, refuse
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput, MeshError
+from ros_pad.errors import MeshError
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
 
@@ -114,8 +114,7 @@ class Mesh:
     ) -> Mesh:
         """Read an STL, OBJ, PLY or MSH (Gmsh) file.
 
-        Triangles and quadrangles are read. From a file that has only tetrahedra, their outer faces
-        are read.
+        Triangles and quadrangles are read.
 
         Parameters
         ----------
@@ -146,7 +145,6 @@ class Mesh:
         path = _known(path)
         if not path.is_file():
             raise MeshError(f'{path}: no such file')
-        meshio = _meshio()
         # For some broken files meshio prints a message and exits the interpreter.
         with (
             open(os.devnull, 'w') as nowhere,
@@ -155,7 +153,7 @@ class Mesh:
             np.errstate(all='ignore'),
         ):
             try:
-                found = meshio.read(path)
+                found = _meshio().read(path)
             except (Exception, SystemExit) as error:
                 reason = str(error) or type(error).__name__
                 raise MeshError(
@@ -163,11 +161,9 @@ class Mesh:
                 ) from error
         faces = _triangles(found.cells)
         points = np.asarray(found.points, dtype=np.float64)
-        if faces.size and points.shape[1:] == (3,) and np.isfinite(points).all():
-            points, faces = _welded(points, faces)
-        points = points * scale
-        if points.shape[1:] == (3,):
-            points[:, 2] += lift
+        _check_arrays(points, faces, os.fspath(path))
+        points, faces = _welded(points, faces)
+        points = points * scale + (0.0, 0.0, lift)
         return cls(points, faces[:, ::-1] if flip else faces, os.fspath(path))
 
     def write(self, path: str | os.PathLike[str]) -> None:
@@ -185,10 +181,8 @@ class Mesh:
         InvalidInput
             When the file exists.
         """
-        path = _known(path)
-        meshio = _meshio()
-        if path.exists():
-            raise InvalidInput(f'{path}: the file exists already and is not overwritten')
+        path, meshio = _known(path), _meshio()
+        refuse(path, force=False)
         options: dict[str, Any] = {
             '.stl': {'binary': True},
             '.msh': {'file_format': 'gmsh', 'binary': False},
@@ -425,7 +419,7 @@ def _meshio() -> Any:
 
 
 def _triangles(cells: Sequence[Any]) -> Indices:
-    """Return the triangles of a file, with quadrangles split, or else the faces of tetrahedra."""
+    """Return the triangles of a file, with quadrangles split."""
     found = [np.empty((0, 3), dtype=np.int64)]
     for block in cells:
         corners = np.asarray(block.data, dtype=np.int64)
@@ -433,17 +427,6 @@ def _triangles(cells: Sequence[Any]) -> Indices:
             found.append(corners[:, :3])
         elif block.type.startswith('quad'):
             found += [corners[:, :3], corners[:, [0, 2, 3]]]
-    if len(found) == 1:
-        for block in cells:
-            if block.type.startswith('tetra'):
-                t = np.asarray(block.data, dtype=np.int64)
-                found += [t[:, [0, 2, 1]], t[:, [0, 1, 3]], t[:, [1, 2, 3]], t[:, [2, 0, 3]]]
-        faces = np.concatenate(found)
-        # Faces between two tetrahedra occur twice.
-        _, which, times = np.unique(
-            np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True
-        )
-        return faces[times[which.ravel()] == 1]
     return np.concatenate(found)
 
 

@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
         failure = error
         values[next(part for part in _TITLES if part not in values)] = {'status': error.status}
     # The membrane model also has solutions above the pressures at which the force limits end.
-    ends: dict[str, float] = {each: largest_pressure(pad, each) for each in criteria(pad)}
+    ends: dict[str, float] = {each: largest_pressure(pad) for each in criteria(pad)}
     values['force_limit_n'] = {
         criterion: contact.force_limit(pad, pressure, criterion) if pressure < end else None
         for criterion, end in ends.items()

@@ -297,7 +297,7 @@ def _with_pad(foot: Foot, pad: Pad, warnings: list[str]) -> Foot:
             f'the criterion of the force limit becomes {limit}: none was measured on a pad of this'
             ' stiffness'
         )
-    end = largest_pressure(pad, limit)
+    end = largest_pressure(pad)
     if ceiling > end:
         ceiling = 1e3 * math.floor(end / 1e3)
         warnings.append(
@@ -413,7 +413,7 @@ def _residuals(
     if len(pressure):
         used = pad.measured_limit is not None
         criterion = 'measured' if used else DEFAULT_CRITERION
-        known = pressure <= largest_pressure(pad, criterion)
+        known = pressure <= largest_pressure(pad)
         model = np.asarray(force_limit(pad, np.where(known, pressure, 0.0), criterion))
         words = [f'{p:g} Pa' for p in pressure]
         add('force_limit', words, pressure, limit, np.where(known, model, np.nan), used)

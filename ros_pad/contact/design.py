@@ -167,8 +167,8 @@ class Design:
     pressure : float
         Gauge pressure needed for the load, Pa; NaN where no pressure of the model carries it.
     ceiling : float
-        Highest available gauge pressure, Pa: that of the supply, or the end of the model or of the
-        measurements if that is lower.
+        Highest available gauge pressure, Pa: that of the supply, or the end of the model if that
+        is lower.
     pad_limit : float
         Force limit of one pad at the ceiling, N.
     reachable_load : float
@@ -243,7 +243,7 @@ def design(
         Number of pads. By default :func:`pads_in`, rounded down.
     ceiling : float
         Highest pressure of the supply, Pa gauge, above 0. ``ceiling`` of the result is at most
-        :func:`ros_pad.contact.limits.largest_pressure` of the criterion.
+        :func:`ros_pad.contact.limits.largest_pressure`.
     margin : float
         Safety factor on the load, above 0.
     criterion : {'thickness', 'flattening', 'measured'}
@@ -272,7 +272,7 @@ def design(
     instance('pad', pad, Pad)
     load = number('load', load, 'N', above=True)
     area = number('area', area, 'm²', above=True)
-    end = largest_pressure(pad, criterion)
+    end = largest_pressure(pad)
     # force_limit can refuse the end itself because of rounding.
     ceiling = min(number('ceiling', ceiling, 'Pa', above=True), end * (1.0 - 1e-15))
     margin = number('margin', margin, '(factor)', above=True)

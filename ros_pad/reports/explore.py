@@ -303,7 +303,7 @@ def _criterion(inputs: Inputs, pad: Pad, parts: _Parts) -> str:
 
 
 def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
-    end, ceiling = largest_pressure(pad, criterion), inputs['supply']
+    end, ceiling = largest_pressure(pad), inputs['supply']
     if ceiling >= end:
         ceiling = float(math.floor(end))
         parts.note(
@@ -348,9 +348,7 @@ def _pitch(inputs: Inputs, free: Inflated | None, parts: _Parts) -> float:
 def _limits(pad: Pad, pressure: float) -> dict[str, float]:
     """Return the force limit of a pad by criterion, N; NaN above a criterion's last pressure."""
     return {
-        each: force_limit(pad, pressure, each)
-        if pressure < largest_pressure(pad, each)
-        else math.nan
+        each: force_limit(pad, pressure, each) if pressure < largest_pressure(pad) else math.nan
         for each in criteria(pad)
     }
 

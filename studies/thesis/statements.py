@@ -82,7 +82,7 @@ def _domes() -> tuple[Claim, ...]:
     stretch = math.sqrt(area) - 1.0
     r, k = LARGE_PAD.radius, LARGE_PAD.stiffness
     needed = TENSION['corrected'] * k / r
-    end = largest_pressure(LARGE_PAD, 'flattening')
+    end = largest_pressure(LARGE_PAD)
     widest = float(inflate(LARGE_PAD, end).sphere_radius) / r
     return (
         claim('area of a dome', (area, stretch),
@@ -152,7 +152,7 @@ def _balloons(name: str, radius: float, thickness: float, section: str) -> Claim
     sheet = Material.load('ecoflex_00_20')
     assert sheet.factor_range is not None
     low, given, high = (
-        1e-3 * largest_pressure(Pad.of(sheet.times(factor), radius, thickness), 'flattening')
+        1e-3 * largest_pressure(Pad.of(sheet.times(factor), radius, thickness))
         for factor in (sheet.factor_range[0], 1.0, sheet.factor_range[1])
     )
     walked = [1e-3 * p for p in WALKED]
