@@ -126,11 +126,10 @@ def press_wet(pad: Pad, pressure: float, force: float, liquid: Liquid) -> WetPad
     dry = _dry(case, float(pressed.contact_radius) / size, float(pressed.gap) / size)
     rigid_wall = _meridian(case, dry[0], dry[2], dry[1], 0.0)
     place, slope, _ = contact(_as_wall(rigid_wall), case.angle, case.length)
-    _refuse_rim(place, dry[2])
+    if place >= dry[2]:
+        raise NoSurface('the liquid reaches the rim of the pad', 'rim')
     rigid = _result(pad, case, (*dry, place), slope, rigid_wall, rigid_wall)
-
     found = _root(lambda x: _misfit(case, x), (*dry, place), 'pad and liquid')
-    _refuse_rim(found[3], found[2])
     wet = _meridian(case, found[0], found[2], found[1] - case.grip, case.weight)
     slope, kink = _joint(case, found[1], float(wet(found[3])[2]))
     angle = math.pi - slope - float(wet(found[3])[2])
@@ -281,11 +280,6 @@ def _root(misfit: Callable[[Array], list[float]], start: Any, what: str) -> tupl
     if not np.max(np.abs(found.fun)) < 1e-7:
         raise NoSurface(f'no equilibrium of {what} was found: {found.message}', 'no_convergence')
     return tuple(float(value) for value in found.x)
-
-
-def _refuse_rim(place: float, length: float) -> None:
-    if place >= length:
-        raise NoSurface('the liquid reaches the rim of the pad', 'rim')
 
 
 def _result(

@@ -356,15 +356,15 @@ def _of_volume(angles: tuple[float, float], gap: float, volume: float) -> float:
 
     # Filling angles that are dense near both ends of the allowed range.
     low, high = (math.log(b / (math.pi - b)) for b in (SMALLEST_FILLING, LARGEST_FILLING))
-    fillings = (math.pi / (1.0 + np.exp(-np.linspace(low, high, 96)))).tolist()
+    fillings = (math.pi / (1.0 + np.exp(-np.linspace(low, high, 48)))).tolist()
     off = [excess(beta) for beta in fillings]
     # The grid misses the largest volume by a little.
     top = int(np.argmax(off))
-    if off[top] < 0.0 < top < 95:
+    if off[top] < 0.0 < top < 47:
         ends = fillings[top - 1], fillings[top + 1]
         fillings[top] = minimize_scalar(lambda b: -excess(b), bounds=ends, method='bounded').x
         off[top] = excess(fillings[top])
-    for k in range(94, -1, -1):
+    for k in range(46, -1, -1):
         if off[k] <= 0.0 <= off[k + 1]:
             ends = fillings[k], fillings[k + 1]
             beta = float(brentq(excess, *ends, xtol=1e-300, rtol=1e-15))

@@ -200,19 +200,11 @@ def from_pressures(pad: Pad, name: str, pressure: Array, height: Array) -> Const
 
 def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[Pad, Constant]:
     """Return the pad with the stiffness or factor that its free domes give, and this constant."""
-    source, free, pressed = measurements.source, measurements.free, measurements.pressed
-    for name, values, unit in (
-        ('height', free.height, 'm'),
-        ('pressure of a free dome', free.pressure, 'Pa'),
-        ('pressure of a pressed dome', pressed.pressure, 'Pa'),
-        ('height of a pressed dome', pressed.height, 'm'),
-        ('gap', pressed.gap, 'm'),
-    ):
-        quantity(f'{source}: {name}', values[~np.isnan(values)], unit, above=True)
-    material = pad.material
-    if material is None:
-        name, unit, value = 'stiffness', 'N/m', pad.stiffness
-    else:
+    source, free, material = measurements.source, measurements.free, pad.material
+    quantity(f'{source}: height', free.height, 'm', above=True)
+    quantity(f'{source}: pressure of a free dome', free.pressure, 'Pa', above=True)
+    name, unit, value = 'stiffness', 'N/m', pad.stiffness
+    if material is not None:
         name, unit, value = 'factor', '(factor)', material.factor
     if not len(free.pressure):
         return pad, Constant(name, unit, value, 'no free dome was measured')

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ros_pad.capillary.bath import Wall, bath_meniscus
-from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid
+from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.errors import InvalidInput, NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
@@ -145,8 +145,6 @@ def test_of_several_the_first_from_the_floor_is_taken():
         (lambda: Wall.cone(1e-3, 0.0), 'inclination'),
         (lambda: Wall.through([1e-3], [0.0]), 'radii'),
         (lambda: Wall.through([1e-3, 1e-3], [1e-3, 0.0]), 'heights'),
-        (lambda: bath_meniscus(1e-3, WATER), 'wall'),
-        (lambda: bath_meniscus(Wall.cylinder(1e-3), 0.073), 'liquid'),
     ],
 )
 def test_bad_input(call, name):

@@ -9,7 +9,7 @@ from ros_pad.capillary.coupling import press_wet
 from ros_pad.contact.dome import press
 from ros_pad.contact.meniscus import WATER
 from ros_pad.contact.pad import LARGE_PAD, Pad
-from ros_pad.errors import InvalidInput, NoSurface
+from ros_pad.errors import NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
 pytestmark = pytest.mark.slow
@@ -89,17 +89,3 @@ def test_liquid_at_the_rim_is_refused():
     with pytest.raises(NoSurface, match='rim') as refusal:
         press_wet(LARGE_PAD, 40e3, 0.05, WATER)
     assert refusal.value.status == 'rim'
-
-
-@pytest.mark.parametrize(
-    ('change', 'name'),
-    [
-        ({'pressure': 0.0}, 'pressure'),
-        ({'force': 0.0}, 'force'),
-        ({'force': [0.1, 0.2]}, 'force'),
-        ({'liquid': 'water'}, 'liquid'),
-    ],
-)
-def test_bad_input(change, name):
-    with pytest.raises(InvalidInput, match=name):
-        press_wet(**{'pad': LARGE_PAD, 'pressure': 75e3, 'force': 0.1, 'liquid': WATER, **change})

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
-import math
 import pathlib
 
 import numpy as np
@@ -131,26 +130,6 @@ def test_ends_of_the_domain(criterion):
     assert np.isnan(pressures).tolist() == [False, True]
     # Adhesion flattens this pad at any pressure of the model: its limit is zero, not an error.
     assert force_limit(Pad(1.5e-3, 40.0, 0.4), 1e3, 'flattening') == 0.0
-
-
-@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, 'x', None])
-def test_bad_numbers(value):
-    with pytest.raises(InvalidInput, match='pressure'):
-        force_limit(LARGE_PAD, value)
-    with pytest.raises(InvalidInput, match='force'):
-        pressure_for(LARGE_PAD, value)
-    with pytest.raises(InvalidInput, match='margin'):
-        pressure_for(LARGE_PAD, 0.1, margin=value)
-
-
-def test_bad_words():
-    with pytest.raises(InvalidInput, match='margin'):
-        pressure_for(LARGE_PAD, 0.1, margin=0.0)
-    for function in (force_limit, pressure_for):
-        with pytest.raises(InvalidInput, match='thickness, flattening, measured'):
-            function(LARGE_PAD, 0.1, 'strength')
-    with pytest.raises(InvalidInput, match='broadcast'):
-        pressure_for(LARGE_PAD, [0.1, 0.2], margin=[1.0, 2.0, 3.0])
 
 
 def test_a_line_that_starts_above_zero_asks_for_no_negative_pressure():
