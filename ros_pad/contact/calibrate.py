@@ -167,35 +167,22 @@ def stiffness_of(pad: Pad, pressure: Array, height: Array) -> Array:
     return pressure * pad.radius / (6.0 * np.sin(t) - 2.0 * np.sin(2.0 * t))
 
 
-def from_pressures(pad: Pad, name: str, pressure: Array, height: Array) -> Constant:
-    """Fit a constant of a pad to free domes, by relative errors of pressure.
+def from_pressures(name: str, unit: str, ratio: Array) -> Constant:
+    """Fit a constant to free domes, by relative errors of pressure.
 
     Pressures and not heights, for near its largest pressure a dome of rubber has a height that
-    small errors of pressure change without bound, and above it has none. The pressure for a
-    height is in proportion to each of these constants.
+    small errors of pressure change without bound, and above it has none.
 
     Parameters
     ----------
-    pad : Pad
-        The pad; ``factor`` is that of its material.
-    name : {'stiffness', 'factor'}
-        The constant.
-    pressure, height : array
-        Gauge pressure, Pa, and height, m, above 0, of each dome.
-
-    Raises
-    ------
-    InvalidInput
-        When no dome of the material has such a height.
+    name, unit : str
+        Name and unit of the constant, to which the pressure for a height is in proportion.
+    ratio : array
+        Pressure for the height of each dome if the constant is 1, over the measured pressure.
     """
-    if name == 'stiffness':
-        each = pressure / stiffness_of(pad, pressure, height)
-    else:
-        assert pad.material is not None
-        each = pressure_for_height(pad, height) / pad.material.factor
-    fit = line_through((each / pressure)[:, None], np.ones_like(pressure))
+    fit = line_through(ratio[:, None], np.ones_like(ratio))
     fit = replace(fit, half_widths=fit.half_widths / fit.values, logarithmic=True)
-    return fit.constant(name, {'stiffness': 'N/m', 'factor': '(factor)'}[name], 'free domes')
+    return fit.constant(name, unit, 'free domes')
 
 
 def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[Pad, Constant]:
@@ -226,7 +213,8 @@ def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[P
         return with_constant(pad, name, found.value), found
     made = material.name or str(material)
     try:
-        found = from_pressures(pad, name, *free)
+        ratio = pressure_for_height(pad, free.height) / material.factor / free.pressure
+        found = from_pressures(name, unit, ratio)
         found = replace(found, note=f'on the stresses of {made}, {found.note}')
         pad = with_constant(pad, name, found.value)
     except InvalidInput as error:

@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 
 from ros_pad.configuration import shared_folder
 from ros_pad.contact import LARGE_PAD, Material, Pad, force_limit, inflate, press
-from ros_pad.contact.calibrate import from_pressures
+from ros_pad.contact.calibrate import from_pressures, stiffness_of
 from ros_pad.contact.fits import Constant
-from ros_pad.contact.hyperelastic import highest_dome
+from ros_pad.contact.hyperelastic import highest_dome, pressure_for_height
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array, with_constant
 from studies.drawing import BLACK, GREEN, ORANGE, PALE, PURPLE, VERMILION
@@ -97,7 +97,7 @@ def points() -> Points:
 def models() -> tuple[Model, ...]:
     """Return the laws, each with its constant fitted to the free domes (cap: as in the thesis)."""
     free = thesis().free
-    stiffness = from_pressures(LARGE_PAD, 'stiffness', *free)
+    stiffness = from_pressures('stiffness', 'N/m', 1.0 / stiffness_of(LARGE_PAD, *free))
     caps = (LARGE_PAD, *_ends(LARGE_PAD, stiffness))
     material = Material.load('dragon_skin_10')
     sheet = Pad.of(material, LARGE_PAD.radius, THICKNESS)
@@ -113,7 +113,8 @@ def _fitted(pad: Pad) -> tuple[Pad, ...]:
     """Return a pad with its factor fitted to the heights that it can have, and both ends."""
     free = thesis().free
     known = free.height < highest_dome(pad)
-    factor = from_pressures(pad, 'factor', free.pressure[known], free.height[known])
+    ratio = pressure_for_height(pad, free.height[known]) / free.pressure[known]
+    factor = from_pressures('factor', '(factor)', ratio)
     return (with_constant(pad, factor.name, factor.value), *_ends(pad, factor))
 
 
