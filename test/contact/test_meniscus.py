@@ -26,27 +26,7 @@ from ros_pad.errors import InvalidInput
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'reference'
 REFERENCE = REFERENCES / 'meniscus_thesis.json'
-APPENDIX_PI = math.pi / 3.1415  # see test_dome.py
 BARE = dataclasses.replace(LARGE_PAD, adhesion_energy=0.0)
-
-
-# Appendix at 75 kPa: force, N; F_cap, mN, with the appendix' tensions and with those of water.
-@pytest.mark.parametrize(
-    ('force', 'appendix', 'water'),
-    [
-        (0.08, 0.0662058309, 1.72557276),
-        (0.19, 0.0667953458, 1.5451832),
-        (0.285, 0.0701850904, 1.52495866),
-    ],
-)
-def test_appendix_forces(force, appendix, water):
-    dome = press(LARGE_PAD, 75e3, force * APPENDIX_PI)
-    thesis = meniscus(dome, THESIS_LIQUID, reading='thesis')
-    assert thesis.tangential_force * 1e3 == pytest.approx(appendix, rel=2e-9)
-    liquid = dataclasses.replace(WATER, contact_angle=1.35)
-    assert meniscus(dome, liquid, 'thesis').tangential_force * 1e3 == pytest.approx(
-        water, rel=3e-8
-    )
 
 
 def test_reference_table():
