@@ -7,7 +7,12 @@ import statistics
 import subprocess
 import sys
 
+import hypothesis
 import pytest
+
+# No test may depend on how busy the machine is.
+hypothesis.settings.register_profile('any machine', deadline=None)
+hypothesis.settings.load_profile('any machine')
 
 # Background jobs of a shell ignore Ctrl-C, and so do the processes that they start. The commands
 # that tests interrupt must not ignore it.

@@ -39,7 +39,7 @@ CASES = (
     (contact.press, ('large', 75e3, 0.1), 'pad'),
     (contact.force_limit, ('large', 75e3), 'pad'),
     (contact.pressure_for, ('large', 0.1), 'pad'),
-    (capillary.bath_meniscus, (), {'liquid': WATER, 'wall': 1e-3}),
+    (capillary.bath_meniscus, (1e-3, WATER), 'wall'),
     (capillary.press_wet, ('large', 75e3, 0.1, WATER), 'pad'),
     (capillary.wet_surface, (capillary.Wall.dome(2e-3, 1e-3), 'water'), 'liquid'),
     (capillary.Wall.through, ([1e-3, 2e-3], [0.0, 'top']), 'heights'),

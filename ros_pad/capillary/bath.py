@@ -245,26 +245,15 @@ class BathMeniscus:
     status: str
 
 
-def bath_meniscus(
-    sphere_radius: float | None = None,
-    contact_radius: float | None = None,
-    *,
-    liquid: Liquid,
-    wall: Wall | None = None,
-    gravity: float = GRAVITY,
-) -> BathMeniscus:
+def bath_meniscus(wall: Wall, liquid: Liquid) -> BathMeniscus:
     """Compute the meniscus of a wide bath at floor level around a pad.
 
     Parameters
     ----------
-    sphere_radius, contact_radius : float, optional
-        Radius of a dome and of its contact with the floor, m, above 0.
+    wall : Wall
+        Wall of an axisymmetric pad.
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
-    wall : Wall, optional
-        Wall of any other axisymmetric pad, instead of the two radii.
-    gravity : float
-        Gravity, m/s², above 0.
 
     Returns
     -------
@@ -274,8 +263,7 @@ def bath_meniscus(
     Raises
     ------
     InvalidInput
-        When a value is not finite, out of range or of the wrong type, or both or none of a dome
-        and a wall are given.
+        When an argument is of the wrong type.
     NoSurface
         With status ``blocked``, where the surface would run through the wall.
 
@@ -285,26 +273,16 @@ def bath_meniscus(
 
     >>> from ros_pad.capillary import Wall, bath_meniscus
     >>> from ros_pad.contact import WATER, Liquid
-    >>> found = bath_meniscus(1.55e-3, 0.583e-3, liquid=WATER)
+    >>> found = bath_meniscus(Wall.dome(1.55e-3, 0.583e-3), WATER)
     >>> round(1e3 * found.height, 3), round(1e6 * found.force), found.status
     (0.889, 384, 'ok')
-    >>> fibre = bath_meniscus(wall=Wall.cylinder(1e-3), liquid=Liquid(0.073, 0.073))
+    >>> fibre = bath_meniscus(Wall.cylinder(1e-3), Liquid(0.073, 0.073))
     >>> round(1e3 * fibre.height, 3)
     1.839
     """
+    instance('wall', wall, Wall)
     instance('liquid', liquid, Liquid)
-    if (wall is None) != (sphere_radius is not None and contact_radius is not None):
-        raise InvalidInput(
-            f'sphere_radius = {sphere_radius!r} and contact_radius = {contact_radius!r}'
-            f' {"without" if wall is None else "with"} a wall are not allowed: either both radii'
-            ' or a wall is needed'
-        )
-    if wall is not None:
-        instance('wall', wall, Wall)
-    else:
-        assert sphere_radius is not None and contact_radius is not None
-        wall = Wall.dome(sphere_radius, contact_radius)
-    weight = liquid.density * number('gravity', gravity, 'm/s²', above=True)
+    weight = liquid.density * GRAVITY
     length = math.sqrt(liquid.surface_tension / weight)
     place, slope, status = contact(wall, liquid.angle, length)
     radius, height, _ = wall.meridian(place)

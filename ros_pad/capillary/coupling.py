@@ -30,7 +30,7 @@ from ros_pad.configuration import instance, number
 from ros_pad.contact.dome import press
 from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.contact.pad import Array, Pad, need_stiffness
-from ros_pad.errors import InvalidInput, NoSurface
+from ros_pad.errors import NoSurface
 
 
 @dataclass(frozen=True)
@@ -47,20 +47,12 @@ class WetPad:
         Tension of the dry part of the membrane, N/m.
     height : float
         Height of the contact line above the floor, m.
-    line_radius : float
-        Radius of the contact line, m.
     kink : float
         Angle by which the membrane bends outwards at the contact line, rad.
     rim_angle : float
         Inclination of the membrane at the rim, rad; above pi/2 it leans inwards.
-    pressure : float
-        Pressure of the liquid minus that of the air at the contact line, Pa.
     force : float
         Vertical force of the liquid on the pad, N, positive towards the floor.
-    radii : array, shape (n,)
-        Radii of points of the wall from the floor to the rim, m.
-    heights : array, shape (n,)
-        Heights of these points, m.
     rigid : WetPad or None
         The same pad without the effect of the liquid on its shape; None in that pad itself.
     """
@@ -69,19 +61,13 @@ class WetPad:
     contact_radius: float
     tension: float
     height: float
-    line_radius: float
     kink: float
     rim_angle: float
-    pressure: float
     force: float
-    radii: Array
-    heights: Array
     rigid: WetPad | None
 
 
-def press_wet(
-    pad: Pad, pressure: float, force: float, liquid: Liquid, gravity: float = GRAVITY
-) -> WetPad:
+def press_wet(pad: Pad, pressure: float, force: float, liquid: Liquid) -> WetPad:
     """Compute a pad that is pressed on a floor with a wide bath at floor level.
 
     Parameters
@@ -94,13 +80,11 @@ def press_wet(
         Normal force on the pad, N, above 0, without the force of the liquid.
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
-    gravity : float
-        Gravity, m/s², above 0.
 
     Returns
     -------
     WetPad
-        Gap, radii and heights, m, tension, N/m, force, N, beside those of the dry shape,
+        Gap, contact radius and height, m, tension, N/m, force, N, beside those of the dry shape,
         ``rigid``.
 
     Raises
@@ -128,7 +112,7 @@ def press_wet(
     need_stiffness('a pad in a bath', pad)
     p = number('pressure', pressure, 'Pa', above=True)
     load = number('force', force, 'N', above=True)
-    weight = liquid.density * number('gravity', gravity, 'm/s²', above=True)
+    weight = liquid.density * GRAVITY
     case = _Case(
         pressure=p * pad.radius / pad.stiffness,
         force=load / (pad.stiffness * pad.radius),
@@ -141,16 +125,11 @@ def press_wet(
     size = pad.radius
     dry = _dry(case, float(pressed.contact_radius) / size, float(pressed.gap) / size)
     rigid_wall = _meridian(case, dry[0], dry[2], dry[1], 0.0)
-    place, slope, status = contact(_as_wall(rigid_wall), case.angle, case.length)
-    if status == 'dry':
-        raise InvalidInput(
-            f'contact_angle = {case.angle:g} rad is not allowed: below pi rad is needed'
-        )
-    _refuse_rim(place, dry[2])
+    place, slope, _ = contact(_as_wall(rigid_wall), case.angle, case.length)
+    if place >= dry[2]:
+        raise NoSurface('the liquid reaches the rim of the pad', 'rim')
     rigid = _result(pad, case, (*dry, place), slope, rigid_wall, rigid_wall)
-
     found = _root(lambda x: _misfit(case, x), (*dry, place), 'pad and liquid')
-    _refuse_rim(found[3], found[2])
     wet = _meridian(case, found[0], found[2], found[1] - case.grip, case.weight)
     slope, kink = _joint(case, found[1], float(wet(found[3])[2]))
     angle = math.pi - slope - float(wet(found[3])[2])
@@ -303,32 +282,21 @@ def _root(misfit: Callable[[Array], list[float]], start: Any, what: str) -> tupl
     return tuple(float(value) for value in found.x)
 
 
-def _refuse_rim(place: float, length: float) -> None:
-    if place >= length:
-        raise NoSurface('the liquid reaches the rim of the pad', 'rim')
-
-
 def _result(
     pad: Pad, case: _Case, unknowns: Any, slope: float, wet: Meridian, above: Meridian,
     kink: float = 0.0, rigid: WetPad | None = None,
 ) -> WetPad:  # fmt: skip
     b, tension, length, place = unknowns
     size = pad.radius
-    line = wet(place)
-    below, beyond = np.linspace(0.0, place, 100), np.linspace(place, length, 101)[1:]
-    path = np.concatenate([wet(below)[:2], above(beyond)[:2]], axis=1) * size
+    line, end = wet(place), above(length)
     unit = pad.stiffness * size
     return WetPad(
-        gap=float(path[1, -1]),
+        gap=float(end[1]) * size,
         contact_radius=b * size,
         tension=tension * pad.stiffness,
         height=float(line[1]) * size,
-        line_radius=float(line[0]) * size,
         kink=kink,
-        rim_angle=float(above(length)[2]),
-        pressure=-case.weight * float(line[1]) * pad.stiffness / size,
+        rim_angle=float(end[2]),
         force=_pull(case, line, slope) * unit,
-        radii=path[0],
-        heights=path[1],
         rigid=rigid,
     )

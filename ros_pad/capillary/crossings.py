@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detection of overlaps in closed triangle meshes: surfaces that cross, and bodies inside bodies.
+"""Triangle meshes cut by planes, and overlaps found in the cuts.
 
-Where two surfaces cross, an edge of one passes through a triangle of the other. Where they only
-coincide, a point just inside one body is inside the other. Corners in files are rounded, so bodies
-that only touch can overlap slightly: what a shift of corners by ``ROUNDING`` removes is contact.
+Corners have x, y, z and whatever else is to be interpolated. Both triangles at an edge get exactly
+the same point of a cut, so that outlines are closed.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from typing import Any, NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,194 +16,80 @@ from ros_pad.contact.pad import Array
 
 Indices: TypeAlias = npt.NDArray[np.int64]
 
-ROUNDING = 5e-7  # of the largest coordinate: more than single precision and welding shift corners
+LAYERS, LINES = 128, 256
+"""Number of horizontal planes, and of lines in each of them, on which overlaps are looked for."""
+ROUNDING = 1e-4
+"""Share of the volume that may be counted twice, as where bodies touch and a file has rounded."""
 
 
-class Overlap(NamedTuple):
-    """An overlap: a triangle of each of the two surfaces, and a point of the overlap, m."""
+def crossed(cuts: Array, start: Array, end: Array) -> tuple[Indices, Indices]:
+    """Return all pairs (span, cut) with the cut, one of rising numbers, inside the span."""
+    first = np.searchsorted(cuts, np.minimum(start, end), 'left')
+    last = np.searchsorted(cuts, np.maximum(start, end), 'left')
+    count = last - first
+    row = np.repeat(np.arange(count.size), count)
+    within = np.arange(row.size) - np.repeat(np.cumsum(count) - count, count)
+    return row, first[row] + within
 
-    faces: tuple[int, int]
-    place: Array
 
-
-def first_overlap(
-    points: Array, faces: Indices, edges: Indices, beside: Indices, bodies: Indices
-) -> Overlap | None:
-    """Return one place where closed bodies overlap or a body cuts itself; None if there is none.
+def cut(corners: Array, offsets: Array) -> tuple[Array, Array]:
+    """Cut triangles by planes: return start and end of each cut, with the solid on the left.
 
     Parameters
     ----------
-    points : array, shape (n, 3)
-        Corners, m.
-    faces : array of int, shape (m, 3)
-        Corners of each triangle, anticlockwise as seen from outside.
-    edges, beside : array of int, shape (3 m/2, 2)
-        Both corners and both triangles of each edge.
-    bodies : array of int, shape (m,)
-        Number of the body of each triangle, from 0.
+    corners : array, shape (n, 3, k)
+        Values at the corners of each triangle.
+    offsets : array, shape (n, 3)
+        Distance of each corner from the plane that cuts its triangle, above 0 on the side from
+        which the cut is seen.
     """
-    slack = ROUNDING * float(np.abs(points).max())
-    for edge, face in _near(points, edges, faces, slack):
-        found = _piercing(points[edges[edge]], points[faces[face]], slack)
-        if found.size:
-            one, other = int(edge[found[0]]), int(face[found[0]])
-            (start, end), (a, b, c) = points[edges[one]], points[faces[other]]
-            above, below = ((each - a) @ np.cross(b - a, c - a) for each in (start, end))
-            place = start + above / (above - below) * (end - start)
-            return Overlap((int(beside[one, 0]), other), place)
-    return _nested(points[faces], bodies, slack)
+    rows = np.arange(len(corners))
+    above = offsets > 0.0
+    ahead = above.sum(axis=1) == 1
+    lone = np.argmax(above == ahead[:, None], axis=1)
+    ends = []
+    for step in (1, 2):
+        other = (lone + step) % 3
+        low, high = np.where(ahead, other, lone), np.where(ahead, lone, other)
+        below = offsets[rows, low]
+        share = (below / (below - offsets[rows, high]))[:, None]
+        ends.append(corners[rows, low] + share * (corners[rows, high] - corners[rows, low]))
+    ahead = ahead[:, None]
+    return np.where(ahead, ends[0], ends[1]), np.where(ahead, ends[1], ends[0])
 
 
-def _piercing(segments: Array, triangles: Array, slack: float) -> Indices:
-    """Return the indices of segments that pass through their triangle for every allowed shift."""
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    start, end = np.moveaxis(segments, 1, 0)
-    heights = _dot(np.cross(b - a, c - a), start - a), _dot(np.cross(b - a, c - a), end - a)
-    rest = np.flatnonzero(heights[0] * heights[1] < 0.0)
-    a, b, c, start, end = (each[rest] for each in (a, b, c, start, end))
-    turns = sum(_side(start, end, *side, slack) for side in ((a, b), (b, c), (c, a)))
-    ends = _side(a, b, c, start, slack) * _side(a, b, c, end, slack)
-    return rest[(np.abs(turns) == 3) & (ends < 0)]
+def outlines(corners: Array, cuts: Array) -> tuple[Array, Array, Indices]:
+    """Cut triangles at heights: return start and end of each cut, and the number of its height."""
+    z = corners[:, :, 2]
+    face, layer = crossed(cuts, z.min(axis=1), z.max(axis=1))
+    return *cut(corners[face], z[face] - cuts[layer][:, None]), layer
 
 
-def _side(a: Array, b: Array, c: Array, d: Array, slack: float) -> Indices:
-    """Return the sign of the volume (b - a, c - a, d - a), 0 if a shift can change it."""
-    u, v, w = b - a, c - a, d - a
-    volume = _dot(np.cross(u, v), w)
-    # A shift of one corner changes the volume in proportion to the opposite face, a shift of two
-    # corners in proportion to the opposite edge.
-    faces = sum(_length(np.cross(*two)) for two in ((u, v), (v, w), (w, u), (v - u, w - u)))
-    edges = sum(_length(edge) for edge in (u, v, w, v - u, w - v, u - w))
-    change = slack * (faces + slack * (edges + 4.0 * slack))
-    return np.where(np.abs(volume) > change, np.sign(volume), 0.0).astype(np.int64)
+def overlap(corners: Array) -> Array | None:
+    """Return a place where closed bodies overlap or a body cuts itself, m; None without any.
 
+    Along a line through closed bodies one is alternately outside and inside. A line that enters
+    again before it has left counts the solid there twice, as any section would.
 
-def _nested(corners: Array, bodies: Indices, slack: float) -> Overlap | None:
-    """Return a place where points just inside a body are inside another one."""
-    members = [np.flatnonzero(bodies == body) for body in range(int(bodies.max()) + 1)]
-    low = np.array([corners[mine].min(axis=(0, 1)) for mine in members])
-    high = np.array([corners[mine].max(axis=(0, 1)) for mine in members])
-    for body, mine in enumerate(members):
-        meets = ((low < high[body] - slack) & (high > low[body] + slack)).all(axis=1)
-        meets[body] = False
-        if not meets.any():
-            continue
-        mine = mine[:: max(1, len(mine) // 200)]
-        a, b, c = np.moveaxis(corners[mine], 1, 0)
-        normal = np.cross(b - a, c - a)
-        size = np.linalg.norm(normal, axis=1)
-        inside = (a + b + c) / 3.0 - 4.0 * slack * normal / np.maximum(size, 1e-300)[:, None]
-        for other in np.flatnonzero(meets):
-            for k in np.flatnonzero(((inside > low[other]) & (inside < high[other])).all(axis=1)):
-                if size[k] > slack * slack and _turns(corners[members[other]] - inside[k]) > 0.5:
-                    return Overlap((int(mine[k]), int(members[other][0])), inside[k])
-    return None
-
-
-def _turns(corners: Array) -> float:
-    """Return the winding number of a surface around the origin: 1 inside a body, 0 outside.
-
-    This is the sum of the solid angles of its triangles over 4 pi (A. van Oosterom and J.
-    Strackee, IEEE Transactions on Biomedical Engineering 30, 1983).
+    Parameters
+    ----------
+    corners : array, shape (n, 3, 3)
+        Corners of each triangle, m, anticlockwise as seen from outside.
     """
-    a, b, c = np.moveaxis(corners, 1, 0)
-    p, q, r = np.linalg.norm(corners, axis=2).T
-    beside = p * q * r + _dot(a, b) * r + _dot(b, c) * p + _dot(c, a) * q
-    return float(np.arctan2(_dot(a, np.cross(b, c)), beside).sum()) / (2.0 * math.pi)
-
-
-def _length(vectors: Array) -> Array:
-    return np.linalg.norm(vectors, axis=-1)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    dot: Array = np.einsum('...i,...i->...', a, b)
-    return dot
-
-
-# --- Pairs of boxes ---------------------------------------------------------------------------
-
-
-class _Tree:
-    """Boxes around edges or triangles in a binary tree: node k has the children 2k and 2k + 1.
-
-    Each level, from the two children of the root, has ``low`` and ``high`` of the boxes, shape
-    (3, nodes), and ``shared``: corners common to all members of a node, or ``none``.
-    """
-
-    def __init__(self, points: Array, members: Indices, depth: int, slack: float, none: int):
-        corners = points[members]
-        low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
-        self.order = _along_curve(0.5 * (low + high))
-        # Single precision is enough: the boxes are enlarged by more than its rounding.
-        level = (
-            _leaves(low[self.order], depth, np.float32, np.inf),
-            _leaves(high[self.order], depth, np.float32, -np.inf),
-            _leaves(members[self.order], depth, np.int64, none),
-        )
-        self.levels = [level]
-        for _ in range(depth - 1):
-            low, high, shared = level
-            first, second = shared[:, ::2], shared[:, 1::2]
-            both = (first[:, None] == second).any(axis=1)
-            level = (
-                np.minimum(low[:, ::2], low[:, 1::2]),
-                np.maximum(high[:, ::2], high[:, 1::2]),
-                np.where(both, first, none),
-            )
-            self.levels.append(level)
-        self.levels.reverse()
-
-
-def _along_curve(places: Array) -> Indices:
-    """Return the order of places along Morton's curve, in which neighbours stay close."""
-    low, size = places.min(axis=0), float(np.ptp(places, axis=0).max())
-    cell = (1023.0 / size * (places - low)).astype(np.int64)
-    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
-        cell = (cell | cell << shift) & mask  # leaves two zeros between bits
-    return np.argsort(cell @ np.array([1, 2, 4]), kind='stable')
-
-
-def _leaves(values: npt.NDArray[Any], depth: int, kind: type, rest: float) -> npt.NDArray[Any]:
-    filled: npt.NDArray[Any] = np.full((values.shape[1], 1 << depth), rest, dtype=kind)
-    filled[:, : len(values)] = values.T
-    return filled
-
-
-def _near(
-    points: Array, edges: Indices, faces: Indices, slack: float
-) -> Iterator[tuple[Indices, Indices]]:
-    """Yield batches of edges and triangles whose boxes intersect and that share no corner.
-
-    SciPy's trees are not used, because they search points with one radius for all: a single large
-    triangle would make all small ones neighbours.
-    """
-    depth = (len(edges) - 1).bit_length()
-    one = _Tree(points, edges, depth, slack, -1)
-    other = _Tree(points, faces, depth, slack, -2)
-    a: Indices = np.zeros(1, dtype=np.int64)
-    b = a  # the roots
-    waiting = [(0, a, b)]
-    while waiting:
-        level, a, b = waiting.pop()
-        if a.size > 1 << 18:  # limits the memory
-            half = a.size // 2
-            waiting += [(level, a[:half], b[:half]), (level, a[half:], b[half:])]
-        elif level == depth:
-            yield one.order[a], other.order[b]
-        else:
-            a = (2 * a[:, None] + np.array([0, 0, 1, 1])).ravel()
-            b = (2 * b[:, None] + np.array([0, 1, 0, 1])).ravel()
-            low, high, corners = one.levels[level]
-            lowest, highest, others = other.levels[level]
-            for axis in range(3):
-                meet = low[axis].take(a) <= highest[axis].take(b)
-                meet &= lowest[axis].take(b) <= high[axis].take(a)
-                a, b = a[meet], b[meet]
-            # Drop pairs that share a corner; otherwise fans of many thin triangles would be
-            # compared with all their own edges.
-            apart = np.ones(a.size, dtype=bool)
-            for mine in corners:
-                for its in others:
-                    apart &= mine.take(a) != its.take(b)
-            waiting.append((level + 1, a[apart], b[apart]))
+    low, size = corners.min(axis=(0, 1)), np.ptp(corners, axis=(0, 1))
+    # No multiple of 1/2, at which made-up meshes have their corners.
+    heights = low[2] + size[2] * (np.arange(LAYERS) + 0.618) / LAYERS
+    lines = low[1] + size[1] * (np.arange(LINES) + 0.382) / LINES
+    start, end, layer = outlines(corners, heights)
+    row, line = crossed(lines, start[:, 1], end[:, 1])
+    start, end = start[row], end[row]
+    x = start[:, 0] + (lines[line] - start[:, 1]) / (end[:, 1] - start[:, 1]) * (end - start)[:, 0]
+    order = np.lexsort((x, LINES * layer[row] + line))
+    depth = np.cumsum(np.where(end[:, 1] < start[:, 1], 1, -1)[order])[:-1]
+    length = np.diff(x[order])
+    twice = np.where((depth < 0) | (depth > 1), length, 0.0)
+    if twice.sum() <= ROUNDING * length[depth > 0].sum():
+        return None
+    longest = order[np.argmax(twice)]
+    middle = x[longest] + 0.5 * twice.max()
+    return np.array([middle, lines[line[longest]], heights[layer[row[longest]]]])

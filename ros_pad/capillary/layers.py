@@ -331,17 +331,6 @@ def wet(
         raise InvalidInput(f'axis = {axis!r} is not allowed: x and y, m, are needed')
     x, y = (number('axis', value, 'm', low=-math.inf) for value in axis)
     cut = walls(mesh, layers, slices, (x, y))
-    return _climb(cut, liquid, balance, (x, y), strict)
-
-
-def _climb(
-    cut: Walls,
-    liquid: Liquid,
-    balance: str,
-    axis: tuple[float, float],
-    strict: bool,
-) -> Wet:
-    """Solve the balance of every slice of a wall."""
     z, r, a = cut.heights, cut.radii, cut.inclinations
     cells, rows = z.size - 1, np.arange(len(r))
     place, least, no_rise = _places(cut, liquid, balance)
@@ -380,7 +369,7 @@ def _climb(
         curvature_radius=curvature,
         pressure=np.where(good, pressure, np.nan),
         status=status,
-        axis=axis,
+        axis=(x, y),
         balance=balance,
         liquid=liquid,
     )
@@ -518,34 +507,20 @@ def wet_pattern(
             f'{mesh.source}: {pads} copies of the mesh need {pads * cut.areas[k]:.4g} m² at'
             f' z = {cut.heights[k]:.4g} m, but area = {area:.4g} m²: the pads overlap'
         )
-    return _fill(cut, void, pads, liquid, area, balance, strict)
-
-
-def _fill(
-    cut: Layers, void: Array, pads: int, liquid: Liquid, area: float, balance: str, strict: bool
-) -> WetPattern:
-    """Solve the balance of a level surface between pads."""
     z, cells = cut.heights, cut.heights.size - 1
     place, no_rise = _level(cut, void, pads, liquid, balance)
     judge = place
     if strict:
         judge, nowhere = _level(cut, void, pads, liquid, 'energy')
         no_rise |= nowhere
-    room, shore = (
-        np.interp(place, np.arange(z.size), each) for each in (void, pads * cut.outline)
-    )
-    if no_rise:
-        status = 'dry'
-    elif math.isnan(place) or math.isnan(judge):
-        status = 'coarse'
-    elif max(place, judge) >= cells:
-        status = 'saturated'
-    elif strict and room > WIDEST_GAP * _capillary_length(liquid) * shore:
-        status = 'far_apart'
-    elif _disagree(place, judge):
-        status = 'far_off'
-    else:
-        status = 'ok'
+    status = _first_statuses(np.array([place]), np.array([judge]), np.array([no_rise]), cells)[0]
+    if status == 'ok':
+        layers_up = np.arange(z.size)
+        room, shore = (np.interp(place, layers_up, each) for each in (void, pads * cut.outline))
+        if strict and room > WIDEST_GAP * _capillary_length(liquid) * shore:
+            status = 'far_apart'
+        elif _disagree(place, judge):
+            status = 'far_off'
     height = place * z[1] if status == 'ok' else math.nan
 
     def here(values: Array) -> float:
@@ -556,7 +531,7 @@ def _fill(
         pressure=-liquid.density * GRAVITY * float(height),
         volume=here(_cumulative(z, void)),
         void_area=here(void),
-        status=status,
+        status=str(status),
         area=float(area),
         pads=pads,
         balance=balance,

@@ -18,10 +18,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ros_pad.capillary.crossings import Indices, first_overlap
-from ros_pad.configuration import integer, number
+from ros_pad.capillary.crossings import Indices, overlap
+from ros_pad.configuration import integer, number, refuse
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput, MeshError
+from ros_pad.errors import MeshError
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
 
@@ -71,8 +71,7 @@ class Mesh:
             )
         used, first = np.unique(faces, return_inverse=True)
         points, faces = points[used], first.reshape(faces.shape)
-        edges, beside = _edges(points, faces, self.source)
-        bodies = _bodies(beside, len(faces))
+        bodies = _bodies(points, faces, self.source)
         _check_volumes(points, faces, bodies, self.source)
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
         if abs(low) > 1e-5 * (high - low):  # files can be in single precision
@@ -81,12 +80,13 @@ class Mesh:
                 f' use lift = {-low:.9g} m'
             )
         points[:, 2] -= low
-        found = first_overlap(points, faces, edges, beside, bodies)
+        found = overlap(points[faces])
         if found is not None:
-            one, other = bodies[list(found.faces)]
-            what = 'the mesh cuts itself' if one == other else 'bodies overlap'
-            x, y, z = found.place
-            raise MeshError(f'{self.source}: {what} at ({x:.4g}, {y:.4g}, {z:.4g}) m')
+            x, y, z = found
+            raise MeshError(
+                f'{self.source}: bodies overlap, or a body cuts itself, at'
+                f' ({x:.4g}, {y:.4g}, {z:.4g}) m'
+            )
         points.setflags(write=False)
         faces.setflags(write=False)
         object.__setattr__(self, 'points', points)
@@ -114,8 +114,7 @@ class Mesh:
     ) -> Mesh:
         """Read an STL, OBJ, PLY or MSH (Gmsh) file.
 
-        Triangles and quadrangles are read. From a file that has only tetrahedra, their outer faces
-        are read.
+        Triangles and quadrangles are read.
 
         Parameters
         ----------
@@ -146,7 +145,6 @@ class Mesh:
         path = _known(path)
         if not path.is_file():
             raise MeshError(f'{path}: no such file')
-        meshio = _meshio()
         # For some broken files meshio prints a message and exits the interpreter.
         with (
             open(os.devnull, 'w') as nowhere,
@@ -155,7 +153,7 @@ class Mesh:
             np.errstate(all='ignore'),
         ):
             try:
-                found = meshio.read(path)
+                found = _meshio().read(path)
             except (Exception, SystemExit) as error:
                 reason = str(error) or type(error).__name__
                 raise MeshError(
@@ -163,11 +161,9 @@ class Mesh:
                 ) from error
         faces = _triangles(found.cells)
         points = np.asarray(found.points, dtype=np.float64)
-        if faces.size and points.shape[1:] == (3,) and np.isfinite(points).all():
-            points, faces = _welded(points, faces)
-        points = points * scale
-        if points.shape[1:] == (3,):
-            points[:, 2] += lift
+        _check_arrays(points, faces, os.fspath(path))
+        points, faces = _welded(points, faces)
+        points = points * scale + (0.0, 0.0, lift)
         return cls(points, faces[:, ::-1] if flip else faces, os.fspath(path))
 
     def write(self, path: str | os.PathLike[str]) -> None:
@@ -185,10 +181,8 @@ class Mesh:
         InvalidInput
             When the file exists.
         """
-        path = _known(path)
-        meshio = _meshio()
-        if path.exists():
-            raise InvalidInput(f'{path}: the file exists already and is not overwritten')
+        path, meshio = _known(path), _meshio()
+        refuse(path, force=False)
         options: dict[str, Any] = {
             '.stl': {'binary': True},
             '.msh': {'file_format': 'gmsh', 'binary': False},
@@ -343,18 +337,13 @@ class Mesh:
         Raises
         ------
         MeshError
-            When neighbours overlap or touch.
+            When neighbours overlap.
         InvalidInput
             As for :meth:`dome`.
         """
         one = cls.dome(sphere_radius, contact_radius, height, rings, sectors)
-        widest = 2.0 * float(np.hypot(*one.points[:, :2].T).max())
         number('pitch', pitch, 'm', above=True)
-        if integer('pads', pads, 1) > 1 and pitch <= widest:
-            raise MeshError(
-                f'pitch = {pitch:g} m is not allowed: above {widest:.6g} m, the width of the'
-                ' domes, is needed'
-            )
+        integer('pads', pads, 1)
         places = np.column_stack([pitch * hexagonal(pads), np.zeros(pads)])
         points = (places[:, None] + one.points[None]).reshape(-1, 3)
         shifts = len(one.points) * np.arange(pads)
@@ -430,7 +419,7 @@ def _meshio() -> Any:
 
 
 def _triangles(cells: Sequence[Any]) -> Indices:
-    """Return the triangles of a file, with quadrangles split, or else the faces of tetrahedra."""
+    """Return the triangles of a file, with quadrangles split."""
     found = [np.empty((0, 3), dtype=np.int64)]
     for block in cells:
         corners = np.asarray(block.data, dtype=np.int64)
@@ -438,17 +427,6 @@ def _triangles(cells: Sequence[Any]) -> Indices:
             found.append(corners[:, :3])
         elif block.type.startswith('quad'):
             found += [corners[:, :3], corners[:, [0, 2, 3]]]
-    if len(found) == 1:
-        for block in cells:
-            if block.type.startswith('tetra'):
-                t = np.asarray(block.data, dtype=np.int64)
-                found += [t[:, [0, 2, 1]], t[:, [0, 1, 3]], t[:, [1, 2, 3]], t[:, [2, 0, 3]]]
-        faces = np.concatenate(found)
-        # Faces between two tetrahedra occur twice.
-        _, which, times = np.unique(
-            np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True
-        )
-        return faces[times[which.ravel()] == 1]
     return np.concatenate(found)
 
 
@@ -490,8 +468,8 @@ def _check_arrays(points: npt.NDArray[Any], faces: npt.NDArray[Any], source: str
         raise MeshError(f'{source}: point {bad[0]} is not finite: {points[bad[0]]}')
 
 
-def _edges(points: Array, faces: Indices, source: str) -> tuple[Indices, Indices]:
-    """Return both corners and both triangles of each edge, shape (edges, 2) each.
+def _bodies(points: Array, faces: Indices, source: str) -> Indices:
+    """Return the body number of each triangle; bodies that share only a point count as two.
 
     Raises `MeshError` where the surface is not closed or not consistently oriented.
     """
@@ -516,14 +494,8 @@ def _edges(points: Array, faces: Indices, source: str) -> tuple[Indices, Indices
                 f' ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) m'
             )
     beside = np.argsort(which, kind='stable').reshape(-1, 2) // 3
-    return np.stack([keys // n, keys % n], axis=1), beside
-
-
-def _bodies(beside: Indices, count: int) -> Indices:
-    """Return the body number of each triangle; bodies that share only a point count as two."""
-    graph = coo_array((np.ones(len(beside)), beside.T), shape=(count, count))
-    bodies: Indices = connected_components(graph, directed=False)[1].astype(np.int64)
-    return bodies
+    graph = coo_array((np.ones(len(beside)), beside.T), shape=(len(faces),) * 2)
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _check_volumes(points: Array, faces: Indices, bodies: Indices, source: str) -> None:

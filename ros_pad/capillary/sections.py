@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.capillary.mesh import Indices, Mesh
+from ros_pad.capillary.crossings import Indices, crossed, cut, outlines
+from ros_pad.capillary.mesh import Mesh
 from ros_pad.contact.pad import Array
 from ros_pad.errors import MeshError
 
@@ -72,80 +73,33 @@ def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Wa
     heights = levels(mesh, layers)
     cuts = _cuts(heights)
     azimuths = 2.0 * math.pi * np.arange(slices) / slices
-    outward = np.stack([np.cos(azimuths), np.sin(azimuths)])
-    which, start, end = _profiles(mesh, outward, axis)
+    outward = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+    # From each point to each plane; layers do not cut horizontal triangles.
+    offset = (mesh.points[:, :2] - axis) @ np.stack([outward[:, 1], -outward[:, 0]])
+    upright = np.flatnonzero(np.ptp(mesh.points[:, 2][mesh.faces], axis=1) > 0.0)
+    beyond = (offset > 0.0)[mesh.faces[upright]]
+    which, face = np.nonzero((beyond.any(axis=1) & ~beyond.all(axis=1)).T)
+    face = upright[face]
+    corners = np.concatenate([mesh.points[mesh.faces[face]], _smooth_normals(mesh, face)], axis=2)
+    start, end = cut(corners, offset[mesh.faces[face], which[:, None]])
 
-    row, layer = _crossed(cuts, start[:, 1], end[:, 1])
-    share = (cuts[layer] - start[row, 1]) / (end[row, 1] - start[row, 1])
-    found = start[row] + share[:, None] * (end[row] - start[row])
-    leaves = np.where(end[row, 1] > start[row, 1], 1, -1)  # 1: leaves the solid, -1: enters it
-    right = found[:, 0] > 0.0
-    found, leaves, row, layer = found[right], leaves[right], row[right], layer[right]
-    cell = which[row] * len(cuts) + layer
+    row, layer = crossed(cuts, start[:, 2], end[:, 2])
+    start, end, away = start[row], end[row], outward[which[row]]
+    share = (cuts[layer] - start[:, 2]) / (end[:, 2] - start[:, 2])
+    found = start + share[:, None] * (end - start)
+    radius = np.sum((found[:, :2] - axis) * away, axis=1)
+    leaves = np.where(end[:, 2] > start[:, 2], 1, -1)  # 1: leaves the solid, -1: enters it
+    right = radius > 0.0
+    cell = (which[row] * len(cuts) + layer)[right]
     count = np.bincount(cell, minlength=slices * len(cuts))
-    turns = _summed(cell, leaves, count.size)
+    turns = _summed(cell, leaves[right], count.size)
     _check_star(mesh, count, turns, heights, azimuths, axis)
 
     radii, inclinations = np.empty(count.size), np.empty(count.size)
-    radii[cell] = found[:, 0]
-    radial = (found[:, 2:4] * outward[:, which[row]].T).sum(axis=1)
-    inclinations[cell] = np.arctan2(radial, -found[:, 4])
+    radii[cell] = radius[right]
+    inclinations[cell] = np.arctan2(np.sum(found[:, 3:5] * away, axis=1), -found[:, 5])[right]
     shape = slices, len(cuts)
     return Walls(azimuths, heights, radii.reshape(shape), inclinations.reshape(shape))
-
-
-def _profiles(
-    mesh: Mesh, outward: Array, axis: tuple[float, float]
-) -> tuple[Indices, Array, Array]:
-    """Cut triangles by planes through the axis with the directions ``outward``, shape (2, planes).
-
-    Returns
-    -------
-    tuple
-        For each cut the number of its plane, and its start and end: radius, height and the three
-        components of the normal.
-    """
-    flat = mesh.points[:, :2] - axis
-    offset = flat @ np.stack([-outward[1], outward[0]])  # from each point to each plane
-    beyond = offset > 0.0
-    z = mesh.points[:, 2][mesh.faces]
-    upright = np.flatnonzero(np.ptp(z, axis=1) > 0.0)  # layers do not cut horizontal triangles
-    first, second, third = (beyond[mesh.faces[upright, k]] for k in range(3))
-    which, face = np.nonzero(((first != second) | (second != third)).T)
-    sides = np.stack([first[face, which], second[face, which], third[face, which]], axis=1)
-    face = upright[face]
-    ahead = sides.sum(axis=1) == 1  # True: one corner beyond the plane; False: two
-    lone = np.argmax(sides == ahead[:, None], axis=1)
-    corners = np.stack([lone, (lone + 1) % 3, (lone + 2) % 3], axis=1)
-    points = mesh.faces[face[:, None], corners]
-    normals = _smooth_normals(mesh, face, corners)
-
-    ends = []
-    for other in (2, 1):
-        # Start from the point with the lower number, so that both triangles at an edge get exactly
-        # the same place.
-        low = np.minimum(points[:, 0], points[:, other])
-        high = np.maximum(points[:, 0], points[:, other])
-        share = offset[low, which] / (offset[low, which] - offset[high, which])
-        place = mesh.points[low] + share[:, None] * (mesh.points[high] - mesh.points[low])
-        radius = ((place[:, :2] - axis) * outward[:, which].T).sum(axis=1)
-        share = np.where(low == points[:, 0], share, 1.0 - share)[:, None]
-        normal = normals[:, 0] + share * (normals[:, other] - normals[:, 0])
-        ends.append(np.column_stack([radius, place[:, 2], normal]))
-    first_end, second_end = ends
-    ahead = ahead[:, None]
-    start = np.where(ahead, first_end, second_end)
-    return which, start, np.where(ahead, second_end, first_end)
-
-
-def _crossed(cuts: Array, start: Array, end: Array) -> tuple[Indices, Indices]:
-    """Return all pairs (span of height, cut) with the cut inside the span."""
-    first = np.searchsorted(cuts, np.minimum(start, end), 'left')
-    last = np.searchsorted(cuts, np.maximum(start, end), 'left')
-    count = last - first
-    row = np.repeat(np.arange(count.size), count)
-    within = np.arange(row.size) - np.repeat(np.cumsum(count) - count, count)
-    return row, first[row] + within
 
 
 def _check_star(
@@ -169,8 +123,8 @@ def _check_star(
             )
 
 
-def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
-    """Return unit normals of the wall at three corners of triangles, shape (n, 3, 3).
+def _smooth_normals(mesh: Mesh, face: Indices) -> Array:
+    """Return unit normals of the wall at the corners of triangles, shape (n, 3, 3).
 
     Each is the mean normal of the triangles around the corner that belong to the same smooth wall,
     weighted by their angles at this corner. Triangles on the floor or at the top are not part of
@@ -191,7 +145,7 @@ def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
 
     order = np.argsort(faces.ravel(), kind='stable')  # corners of all triangles, sorted by point
     begin = np.searchsorted(faces.ravel()[order], np.arange(len(points) + 1))
-    wanted, back = np.unique(3 * face[:, None] + corners, return_inverse=True)
+    wanted, back = np.unique(3 * face[:, None] + np.arange(3), return_inverse=True)
     point = faces.ravel()[wanted]
     count = begin[point + 1] - begin[point]
     row = np.repeat(np.arange(wanted.size), count)
@@ -206,7 +160,8 @@ def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
         )
     )
     inner = np.bincount(row, ~alike, wanted.size) == 0.0
-    mean, inner = mean[back.reshape(corners.shape)], inner[back.reshape(corners.shape)]
+    back = back.reshape(-1, 3)
+    mean, inner = mean[back], inner[back]
 
     # At an edge of the wall the mean is one-sided. On an arc, the normal of a chord bisects the
     # normals at both ends of the chord: mirror the normal at the inner end.
@@ -261,8 +216,7 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
     corners = mesh.points[mesh.faces]
     upright = np.flatnonzero(np.ptp(corners[:, :, 2], axis=1) > 0.0)
     corners = corners[upright]
-    normals = _smooth_normals(mesh, upright, np.tile([0, 1, 2], (upright.size, 1)))
-    wall = np.concatenate([corners, normals], axis=2)
+    wall = np.concatenate([corners, _smooth_normals(mesh, upright)], axis=2)
     pieces = np.array_split(cuts, min(cuts.size, 1 + len(wall) * cuts.size // 2_000_000))
     areas, wetted, outline, pull, gain = np.concatenate(
         [_cut_level(wall, piece, angle) for piece in pieces], axis=1
@@ -273,8 +227,8 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
 
 def _cut_level(wall: Array, cuts: Array, angle: float) -> Array:
     """Return all arrays of :class:`Layers` but ``heights``, for triangles with normals."""
-    start, end, layer = _outlines(wall, cuts)
-    nx, ny, nz = 0.5 * (start + end)[:, 2:].T
+    start, end, layer = outlines(wall, cuts)
+    nx, ny, nz = 0.5 * (start + end)[:, 3:].T
     slope = np.arctan2(np.hypot(nx, ny), -nz)
     length = np.hypot(*(end - start)[:, :2].T)
     gain = (np.cos(slope) + math.cos(angle)) / np.maximum(np.sin(slope), 1e-12)
@@ -305,33 +259,10 @@ def _freed_by_level_faces(mesh: Mesh, heights: Array, angle: float) -> Array:
 
 def centre(mesh: Mesh, height: float) -> tuple[float, float]:
     """Return the centroid (x, y) of the section at a height, m."""
-    start, end, _ = _outlines(mesh.points[mesh.faces], np.array([height]))
+    start, end, _ = outlines(mesh.points[mesh.faces], np.array([height]))
     cross = _cross(start, end)
     x, y = ((start + end)[:, :2] * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
     return float(x), float(y)
-
-
-def _outlines(corners: Array, cuts: Array) -> tuple[Array, Array, Indices]:
-    """Return the segments of the outlines: start, end and layer; the solid is on the left.
-
-    Corners have x, y, z and further values to interpolate, shape (triangles, 3, n). Start and end
-    have the same values without z.
-    """
-    z = corners[:, :, 2]
-    face, layer = _crossed(cuts, z.min(axis=1), z.max(axis=1))
-    above = z[face] > cuts[layer][:, None]
-    ahead = above.sum(axis=1, keepdims=True) == 1
-    lone = np.argmax(above == ahead, axis=1)
-    first = corners[face, lone]
-    ends = []
-    for step in (1, 2):
-        other = corners[face, (lone + step) % 3]
-        # Always start from the lower point, so that both triangles at an edge get exactly the same
-        # place.
-        low, high = np.where(ahead, other, first), np.where(ahead, first, other)
-        share = (cuts[layer] - low[:, 2]) / (high[:, 2] - low[:, 2])
-        ends.append(np.delete(low + share[:, None] * (high - low), 2, axis=1))
-    return np.where(ahead, ends[0], ends[1]), np.where(ahead, ends[1], ends[0]), layer
 
 
 def _area_below(corners: Array, cuts: Array) -> Array:
@@ -340,7 +271,7 @@ def _area_below(corners: Array, cuts: Array) -> Array:
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
     low, middle, high = np.sort(corners[:, :, 2], axis=1).T
-    face, layer = _crossed(cuts, low, high)
+    face, layer = crossed(cuts, low, high)
     z = cuts[layer]
     a, b, c = low[face], middle[face], high[face]
     with np.errstate(divide='ignore', invalid='ignore'):

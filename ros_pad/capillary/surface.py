@@ -54,11 +54,6 @@ class WetSurface:
         Points of the contact line on the pad, in order of azimuth, m.
     axis : tuple of float
         x and y of the axis of the pad, m.
-    area : float
-        Area between liquid and air, m².
-    energy : float
-        Energy of surface, weight and wetting, J, with a smooth contact line: it converges faster
-        than area and volume, whose line has corners.
     volume : float
         Volume of the liquid above the floor, m³.
     force : array, shape (3,)
@@ -75,8 +70,6 @@ class WetSurface:
     triangles: Indices
     line: Array
     axis: tuple[float, float]
-    area: float
-    energy: float
     volume: float
     force: Array
     error: float
@@ -195,22 +188,14 @@ def wet_surface(
         heights.append(surface.points[surface.ring, 2].mean())
     error = abs(1.0 - heights[-2] / heights[-1]) if refinements else math.nan
     result = _Energy(task, surface)
-    energy = result.value(result.start)[0]
-    # Rings are polygons, and the energy is often a small difference: their error is estimated
-    # with twice as many corners. It falls with the square of the number.
-    finer = _Energy(task, _refined(task, surface))
-    energy += 4.0 / 3.0 * (finer.value(finer.start)[0] - energy)
-    unit = liquid.surface_tension * size
     vertices = surface.points * size + (*axis, 0.0)
     return WetSurface(
         vertices=vertices,
         triangles=surface.triangles,
         line=vertices[surface.ring],
         axis=axis,
-        area=0.5 * float(np.linalg.norm(_across(surface), axis=1).sum()) * size**2,
-        energy=float(energy) * unit * size,
         volume=result.volume() * size**3,
-        force=result.force(surface) * unit,
+        force=result.force(surface) * liquid.surface_tension * size,
         error=float(error) * (2.0 if liquid.angle < WETTING else 1.0),
         liquid=liquid,
     )
@@ -332,7 +317,7 @@ def _in_bath(curves: Array, liquid: Liquid) -> tuple[_Surface, Rails]:
     """Return the exact meniscus of the axisymmetric pad with the same mean radii."""
     mean, sectors = curves.mean(axis=0), len(curves)
     wall = replace(Wall.through(*mean.T), steps=12)  # coarse: only a start is needed
-    bath = bath_meniscus(wall=wall, liquid=liquid)
+    bath = bath_meniscus(wall, liquid)
     if bath.status in ('dry', 'rim'):
         why = 'is pushed below the floor, where the wall ends'
         if bath.status == 'rim':

@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
         failure = error
         values[next(part for part in _TITLES if part not in values)] = {'status': error.status}
     # The membrane model also has solutions above the pressures at which the force limits end.
-    ends: dict[str, float] = {each: largest_pressure(pad, each) for each in criteria(pad)}
+    ends: dict[str, float] = {each: largest_pressure(pad) for each in criteria(pad)}
     values['force_limit_n'] = {
         criterion: contact.force_limit(pad, pressure, criterion) if pressure < end else None
         for criterion, end in ends.items()
@@ -124,8 +124,7 @@ def _shapes(pad: contact.Pad, options: argparse.Namespace) -> Iterator[tuple[str
     pressure, force = options.pressure, options.force
     free = contact.inflate(pad, pressure)
     yield 'free', values(free, 'height', 'sphere_radius', 'volume')
-    adhesion = 'matlab' if pad.material is None else 'none'
-    pressed = contact.press(pad, pressure, force, adhesion, options.model)
+    pressed = contact.press(pad, pressure, force, options.model)
     names = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap', 'status')
     yield 'pressed', values(pressed, *names)
     if not force > 0.0:  # the ring around a dome without load is too small to compute

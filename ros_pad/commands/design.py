@@ -23,8 +23,7 @@ from ros_pad.commands.command import FILE, Commands, add_command, print_table
 from ros_pad.commands.folder import check_picture
 from ros_pad.configuration import number
 from ros_pad.contact import Design, Foot, Material, design
-from ros_pad.contact.candidates import Candidate, candidates
-from ros_pad.contact.design import CELL
+from ros_pad.contact.design import CELL, Candidate, candidates
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, criteria, resized
 from ros_pad.errors import InvalidInput
 

@@ -14,28 +14,33 @@ import math
 import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ros_pad.configuration import number, quantity
+from ros_pad.configuration import Setting, number, quantity
 from ros_pad.contact.dome import BURST, inflate, press
-from ros_pad.contact.film import WATER_VISCOSITY
-from ros_pad.contact.fits import Constant, Residual, fit_positive, kept_constant, line_through
+from ros_pad.contact.film import WATER_VISCOSITY, Film
+from ros_pad.contact.fits import Constant, Residual, fit_positive, line_through
 from ros_pad.contact.foot_file import foot_text
-from ros_pad.contact.friction_fit import WetFloor, fit_friction, modelled_forces
 from ros_pad.contact.hyperelastic import pressure_for_height
 from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, force_limit, largest_pressure
-from ros_pad.contact.measurements import Measurements
+from ros_pad.contact.measurements import Friction, Measurements
 from ros_pad.contact.pad import Array, MeasuredLimit, Pad, with_constant
-from ros_pad.contact.resistance import LIMIT_SETTINGS, PAD_SETTINGS, Foot
+from ros_pad.contact.resistance import FOOT_SETTINGS, LIMIT_SETTINGS, PAD_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
-# Settings of a foot file for the constants that are checked only after the fit.
-_IN_FOOT = {
-    'stiffness': PAD_SETTINGS[1],
-    'force_limit': LIMIT_SETTINGS[0],
-    'force_limit_slope': LIMIT_SETTINGS[2],
+# Constants of friction in the order in which they are fitted: the start value for a foot in which
+# one is 0, and the lowest value of a fit.
+_FRICTION = {
+    'friction': (0.3, 0.01),
+    'shear_strength': (3e3, 1.0),
+    'conforming_pressure': (1e4, 1.0),
+    'boundary_friction': (0.1, 1e-4),
+    'critical_film': (3e-7, 1e-9),
+    'film_exponent': (2.0, 0.1),
 }
+_SETTINGS = {each.name: each for each in FOOT_SETTINGS}
 
 
 @dataclass(frozen=True)
@@ -105,11 +110,9 @@ def calibrate(
     start = foot.pad if rubber is None else rubber
     warnings: list[str] = []
     pad, shape = _shape(measurements, start, warnings)
-    _check(measurements.source, [shape])
     pad, line = _limit(measurements, pad, warnings)
     foot = _with_pad(foot, pad, warnings)
-    floor = WetFloor(film_thickness, viscosity)
-    foot, friction = fit_friction(measurements, foot, floor, warnings)
+    foot, friction = _fit_friction(measurements, foot, (film_thickness, viscosity), warnings)
     constants = (shape, *line, *friction)
     if not any(constant.fitted for constant in constants):
         raise InvalidInput(
@@ -117,18 +120,14 @@ def calibrate(
             ' line of the force limit needs force limits at two pressures; friction needs'
             ' tangential forces'
         )
-    _check(measurements.source, line)
-    residuals = _residuals(measurements, foot, floor)
+    residuals = _residuals(measurements, foot, (film_thickness, viscosity))
     return Calibration(measurements, foot, constants, residuals, tuple(warnings))
 
 
-def _check(source: str, constants: Sequence[Constant]) -> None:
+def _check(source: str, constant: Constant, allowed: Setting) -> None:
     """Raise `InvalidInput` for a fitted constant that no foot file may have."""
-    for constant in constants:
-        allowed = _IN_FOOT.get(constant.name)
-        if constant.fitted and allowed:
-            what = f'{source}: check the units of the measurements: {constant.name}'
-            number(what, constant.value, constant.unit, allowed.low, allowed.high)
+    what = f'{source}: check the units of the measurements: {constant.name}'
+    number(what, constant.value, constant.unit, allowed.low, allowed.high)
 
 
 def foot_file(calibration: Calibration) -> str:
@@ -168,55 +167,34 @@ def stiffness_of(pad: Pad, pressure: Array, height: Array) -> Array:
     return pressure * pad.radius / (6.0 * np.sin(t) - 2.0 * np.sin(2.0 * t))
 
 
-def from_pressures(pad: Pad, name: str, pressure: Array, height: Array) -> Constant:
-    """Fit a constant of a pad to free domes, by relative errors of pressure.
+def from_pressures(name: str, unit: str, ratio: Array) -> Constant:
+    """Fit a constant to free domes, by relative errors of pressure.
 
     Pressures and not heights, for near its largest pressure a dome of rubber has a height that
-    small errors of pressure change without bound, and above it has none. The pressure for a
-    height is in proportion to each of these constants.
+    small errors of pressure change without bound, and above it has none.
 
     Parameters
     ----------
-    pad : Pad
-        The pad; ``factor`` is that of its material.
-    name : {'stiffness', 'factor'}
-        The constant.
-    pressure, height : array
-        Gauge pressure, Pa, and height, m, above 0, of each dome.
-
-    Raises
-    ------
-    InvalidInput
-        When no dome of the material has such a height.
+    name, unit : str
+        Name and unit of the constant, to which the pressure for a height is in proportion.
+    ratio : array
+        Pressure for the height of each dome if the constant is 1, over the measured pressure.
     """
-    if name == 'stiffness':
-        each = pressure / stiffness_of(pad, pressure, height)
-    else:
-        assert pad.material is not None
-        each = pressure_for_height(pad, height) / pad.material.factor
-    fit = line_through((each / pressure)[:, None], np.ones_like(pressure))
+    fit = line_through(ratio[:, None], np.ones_like(ratio))
     fit = replace(fit, half_widths=fit.half_widths / fit.values, logarithmic=True)
-    return fit.constant(name, {'stiffness': 'N/m', 'factor': '(factor)'}[name], 'free domes')
+    return fit.constant(name, unit, 'free domes')
 
 
 def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[Pad, Constant]:
     """Return the pad with the stiffness or factor that its free domes give, and this constant."""
-    source, free, pressed = measurements.source, measurements.free, measurements.pressed
-    for name, values, unit in (
-        ('height', free.height, 'm'),
-        ('pressure of a free dome', free.pressure, 'Pa'),
-        ('pressure of a pressed dome', pressed.pressure, 'Pa'),
-        ('height of a pressed dome', pressed.height, 'm'),
-        ('gap', pressed.gap, 'm'),
-    ):
-        quantity(f'{source}: {name}', values[~np.isnan(values)], unit, above=True)
-    material = pad.material
-    if material is None:
-        name, unit, value = 'stiffness', 'N/m', pad.stiffness
-    else:
+    source, free, material = measurements.source, measurements.free, pad.material
+    quantity(f'{source}: height', free.height, 'm', above=True)
+    quantity(f'{source}: pressure of a free dome', free.pressure, 'Pa', above=True)
+    name, unit, value = 'stiffness', 'N/m', pad.stiffness
+    if material is not None:
         name, unit, value = 'factor', '(factor)', material.factor
     if not len(free.pressure):
-        return pad, kept_constant(name, unit, value, 'no free dome was measured')
+        return pad, Constant(name, unit, value, 'no free dome was measured')
     if material is None:
 
         def heights(k: Array) -> Array:
@@ -231,10 +209,12 @@ def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[P
                 f'one stiffness does not fit all points: single points give {each[0]:.3g} N/m at'
                 f' {free.pressure.min():g} Pa and {each[-1]:.3g} N/m at {free.pressure.max():g} Pa'
             )
+        _check(source, found, PAD_SETTINGS[1])
         return with_constant(pad, name, found.value), found
     made = material.name or str(material)
     try:
-        found = from_pressures(pad, name, *free)
+        ratio = pressure_for_height(pad, free.height) / material.factor / free.pressure
+        found = from_pressures(name, unit, ratio)
         found = replace(found, note=f'on the stresses of {made}, {found.note}')
         pad = with_constant(pad, name, found.value)
     except InvalidInput as error:
@@ -268,16 +248,15 @@ def _limit(
         if line is None:
             return pad, []
         at = f"the start foot's line, on one pad at {line.pressure:g} Pa"
-        slope = kept_constant('force_limit_slope', 'N/Pa', line.slope, "the start foot's line")
-        return pad, [kept_constant('force_limit', 'N', line.force, at), slope]
+        slope = Constant('force_limit_slope', 'N/Pa', line.slope, "the start foot's line")
+        return pad, [Constant('force_limit', 'N', line.force, at), slope]
     middle = float(pressure.mean())
     fit = line_through(np.column_stack([np.ones_like(pressure), pressure - middle]), limit)
     at = f'line of the force limit of one pad, at {middle:g} Pa'
     force = fit.constant('force_limit', 'N', at, 0)
     slope = fit.constant('force_limit_slope', 'N/Pa', 'slope of this line', 1)
-    where = f'{measurements.source}: the line through the measured force limits'
-    number(f'{where}: slope', slope.value, 'N/Pa', above=True)
-    number(f'{where}: force at {middle:g} Pa', force.value, 'N')
+    _check(measurements.source, force, LIMIT_SETTINGS[0])
+    _check(measurements.source, slope, LIMIT_SETTINGS[2])
     return replace(pad, measured_limit=MeasuredLimit(force.value, middle, slope.value)), [
         force,
         slope,
@@ -298,7 +277,7 @@ def _with_pad(foot: Foot, pad: Pad, warnings: list[str]) -> Foot:
             f'the criterion of the force limit becomes {limit}: none was measured on a pad of this'
             ' stiffness'
         )
-    end = largest_pressure(pad, limit)
+    end = largest_pressure(pad)
     if ceiling > end:
         ceiling = 1e3 * math.floor(end / 1e3)
         warnings.append(
@@ -308,7 +287,88 @@ def _with_pad(foot: Foot, pad: Pad, warnings: list[str]) -> Foot:
     return replace(foot, pad=pad, limit=limit, ceiling=ceiling)
 
 
-def _residuals(measurements: Measurements, foot: Foot, floor: WetFloor) -> tuple[Residual, ...]:
+def _modelled_forces(friction: Friction, foot: Foot, floor: tuple[float, float]) -> Array:
+    """Return the model's largest tangential force for each row of measurements, N.
+
+    ``floor`` has the thickness of the film before a foot lands, m, and its viscosity, Pa s.
+    """
+    forces = []
+    for pressure, load, _, wet, stance_time in zip(
+        *(column.tolist() for column in friction), strict=True
+    ):
+        domes = foot.dome_load(load, pressure)
+        sole = load - domes
+        films = (0.0, 0.0)
+        if wet:
+            film = Film(foot, floor[1])
+            film.touch_down(floor[0])
+            films = film.drain(domes, sole, pressure, stance_time)
+        forces.append(foot.resistance_of(domes, sole, pressure, *films))
+    return np.array(forces)
+
+
+def _fit_friction(
+    measurements: Measurements, foot: Foot, floor: tuple[float, float], warnings: list[str]
+) -> tuple[Foot, list[Constant]]:
+    """Return the foot with the fitted constants of friction, and these constants; add warnings."""
+    friction, source = measurements.friction, measurements.source
+    for name in ('load', 'tangential_force'):
+        quantity(f'{source}: {name}', getattr(friction, name), 'N', above=True)
+    quantity(f'{source}: stance_time on a wet floor', friction.stance_time[friction.wet], 's')
+    what = f'{source}: pressure of a friction row on the foot {foot.source}'
+    quantity(what, friction.pressure, 'Pa', high=foot.ceiling)
+    fitted: list[str] = []
+    fit = None
+    # A constant is added if the data identify it together with the earlier ones. The second round
+    # is for constants that are identified only after a later one has been added.
+    for name in [*_FRICTION, *_FRICTION]:
+        if name in fitted or len(fitted) == len(friction.load):
+            continue
+        trial = [*fitted, name]
+        before: list[float] = [] if fit is None else fit.values.tolist()
+        start = getattr(foot, name) or _FRICTION[name][0]
+        least = [_FRICTION[each][1] for each in trial]
+        most = [_SETTINGS[each].high for each in trial]
+
+        def forces(values: Array, names: Sequence[str] = trial) -> Array:
+            return _modelled_forces(friction, _changed(foot, names, values), floor)
+
+        # The law has kinks: a fit can stop on the wrong side of one.
+        attempts = [
+            fit_positive(forces, friction.tangential_force, [*before, factor * start], least, most)
+            for factor in (1.0, 0.3, 3.0)
+        ]
+        best = min(attempts, key=lambda attempt: attempt.cost)
+        if best.identified():
+            fitted, fit = trial, best
+    constants = []
+    note = 'not identified by these forces: kept'
+    if not len(friction.load):
+        note = 'no friction was measured'
+    for name in _FRICTION:
+        unit = _SETTINGS[name].unit
+        if fit is not None and name in fitted:
+            words = f'{len(friction.load)} forces'
+            constants.append(fit.constant(name, unit, words, fitted.index(name)))
+        else:
+            constants.append(Constant(name, unit, getattr(foot, name), note))
+    kept = [name for name in _FRICTION if name not in fitted]
+    if kept and len(friction.load):
+        warnings.append(
+            f'{", ".join(kept)}: not identified by the tangential forces; the fitted constants of'
+            f' friction are valid only if these values of {foot.source} are right'
+        )
+    return foot if fit is None else _changed(foot, fitted, fit.values), constants
+
+
+def _changed(foot: Foot, names: Sequence[str], values: Array) -> Foot:
+    changes: dict[str, Any] = dict(zip(names, values.tolist(), strict=True))
+    return replace(foot, **changes)
+
+
+def _residuals(
+    measurements: Measurements, foot: Foot, floor: tuple[float, float]
+) -> tuple[Residual, ...]:
     """Return all measured numbers beside those of the foot."""
     pad, free, pressed = foot.pad, measurements.free, measurements.pressed
     found: list[Residual] = []
@@ -333,7 +393,7 @@ def _residuals(measurements: Measurements, foot: Foot, floor: WetFloor) -> tuple
     if len(pressure):
         used = pad.measured_limit is not None
         criterion = 'measured' if used else DEFAULT_CRITERION
-        known = pressure <= largest_pressure(pad, criterion)
+        known = pressure <= largest_pressure(pad)
         model = np.asarray(force_limit(pad, np.where(known, pressure, 0.0), criterion))
         words = [f'{p:g} Pa' for p in pressure]
         add('force_limit', words, pressure, limit, np.where(known, model, np.nan), used)
@@ -342,6 +402,6 @@ def _residuals(measurements: Measurements, foot: Foot, floor: WetFloor) -> tuple
         f'{f"domes of {p:g} Pa" if p > 0.0 else "flat"}, {"wet" if wet else "dry"}, {load:g} N'
         for p, load, wet in zip(rows.pressure, rows.load, rows.wet, strict=True)
     ]
-    model = modelled_forces(rows, foot, floor)
+    model = _modelled_forces(rows, foot, floor)
     add('tangential_force', words, rows.pressure, rows.tangential_force, model, True)
     return tuple(found)

@@ -22,24 +22,24 @@ class Constant:
         Name and unit of the constant.
     value : float
         Value in this unit.
+    note : str
+        Purpose of the constant, or the reason why it was kept.
     low, high : float
         95 % interval; NaN where there are no more points than constants, or nothing was fitted.
     points : int
         Number of measurements used for the fit.
     fitted : bool
         True if fitted, False if kept from the start foot.
-    note : str
-        Purpose of the constant, or the reason why it was kept.
     """
 
     name: str
     unit: str
     value: float
-    low: float
-    high: float
-    points: int
-    fitted: bool
     note: str
+    low: float = math.nan
+    high: float = math.nan
+    points: int = 0
+    fitted: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Fit:
             low, high = value * math.exp(-width), value * math.exp(width)
         else:
             low, high = value - width, value + width
-        return Constant(name, unit, value, low, high, self.points, True, note)
+        return Constant(name, unit, value, note, low, high, self.points, True)
 
     def identified(self) -> bool:
         """Return whether the data determine each constant separately.
@@ -156,8 +156,3 @@ def _half_widths(jacobian: Array, residuals: Array) -> Array:
         return np.full(constants, np.nan)
     covariance = residuals @ residuals / spare * np.linalg.pinv(jacobian.T @ jacobian)
     return np.asarray(student.ppf(0.975, spare) * np.sqrt(np.diag(covariance)))
-
-
-def kept_constant(name: str, unit: str, value: float, note: str) -> Constant:
-    """Return a constant that was not fitted."""
-    return Constant(name, unit, value, math.nan, math.nan, 0, False, note)

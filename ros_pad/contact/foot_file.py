@@ -9,13 +9,6 @@ from collections.abc import Iterable, Mapping
 from ros_pad.contact.resistance import FOOT_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
-FITTED = (
-    *('friction', 'shear_strength', 'conforming_pressure'),
-    *('boundary_friction', 'critical_film', 'film_exponent'),
-)
-"""Constants of friction in the order in which they are fitted."""
-UNITS = {each.name: each.unit for each in FOOT_SETTINGS}
-
 
 def foot_text(
     foot: Foot, description: str, head: Iterable[str], comments: Mapping[str, str]
@@ -78,14 +71,8 @@ def foot_text(
             entry('pressure', limit.pressure, 'Pa gauge', '    '),
             entry('slope', limit.slope, f'N/Pa, {comment("force_limit_slope")}', '    '),
         ]
-    lines += ['', f'pads: {foot.pads}', entry('sole_radius', foot.sole_radius, 'm')]
-    for name in FITTED:
-        lines.append(entry(name, getattr(foot, name), f'{UNITS[name]}, {comment(name)}'))
-    lines += [
-        entry('shear_stiffness', foot.shear_stiffness, 'N/m of the whole foot'),
-        entry('chamber_volume', foot.chamber_volume, 'm3 of air without the domes'),
-        entry('ceiling', foot.ceiling, 'Pa gauge'),
-        entry('capillary_force', foot.capillary_force, 'N a dome, of the start foot'),
-        f'force_limit: {foot.limit}',
-    ]
-    return '\n'.join(lines) + '\n'
+    lines += ['', f'pads: {foot.pads}']
+    for each in FOOT_SETTINGS[1:]:
+        words = f'{each.unit}, {comment(each.name)}'.removeprefix(', ')
+        lines.append(entry(each.name, getattr(foot, each.name), words))
+    return '\n'.join([*lines, f'force_limit: {foot.limit}']) + '\n'

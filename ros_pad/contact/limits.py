@@ -31,7 +31,7 @@ from ros_pad.contact.dome import (
     inflate,
     largest_tension,
     press,
-    signed_adhesion,
+    relative_adhesion,
 )
 from ros_pad.contact.pad import LARGE_PAD, Array, Floats, MeasuredLimit, Pad, broadcast, plain
 from ros_pad.contact.roots import rising_root
@@ -40,10 +40,8 @@ from ros_pad.errors import InvalidInput, NoEquilibrium
 CRITERIA = ('thickness', 'flattening', 'measured')
 DEFAULT_CRITERION = 'thickness'
 
-# Line fitted to the thesis' measurements on its large pad.
+# Line fitted to the thesis' measurements on its large pad at up to 85 kPa.
 THESIS_LIMIT = MeasuredLimit(force=0.2833, pressure=75e3, slope=1.25e-5)
-# The thesis measured up to 85 kPa; the line is extrapolated to the end of this pad's model.
-_THESIS_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
 
 
 def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRITERION) -> Floats:
@@ -55,7 +53,6 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
         Size and material.
     pressure : float or array
         Gauge pressure, Pa, from 0 to the end of the model (see :func:`ros_pad.contact.press`).
-        With the measurements of the thesis also at most 91.36 kPa.
     criterion : {'thickness', 'flattening', 'measured'}
         See :mod:`ros_pad.contact.limits`. ``measured`` needs a ``measured_limit`` of the pad, or
         the large pad of the thesis: ``0.2833 + 0.0125 (p/kPa - 75)`` N.
@@ -72,8 +69,8 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
         For a scalar pressure above the end of the model; status ``fold_zone`` or
         ``no_inflation``.
     InvalidInput
-        When the criterion is unknown or not known for this pad, or a pressure is negative, not
-        finite, or above the measurements.
+        When the criterion is unknown or not known for this pad, or a pressure is negative or not
+        finite.
 
     Examples
     --------
@@ -99,8 +96,7 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
     # press can refuse the end itself because of rounding.
     p = np.minimum(np.where(inside, p, 0.0), end * (1.0 - 1e-15))
     if criterion == 'measured':
-        line = measured_line(pad)
-        quantity('pressure', p, 'Pa', high=_end_of_measurements(pad))
+        line = pad.measured_limit or THESIS_LIMIT
         limit = np.maximum(line.force + line.slope * (p - line.pressure), 0.0)
     else:
         limit = np.maximum(_flattening(pad, p), 0.0)
@@ -157,7 +153,7 @@ def pressure_for(
     factor = quantity('margin', margin, '(factor)', above=True)
     load, factor = broadcast('force and margin', load, factor)
     load = load * factor
-    end = largest_pressure(pad, criterion)
+    end = largest_pressure(pad)
     strongest = force_limit(pad, end * (1.0 - 1e-15), criterion)
     carried = load <= strongest
     if np.ndim(load) == 0 and not carried:
@@ -168,7 +164,7 @@ def pressure_for(
         )
     load = np.where(carried, load, 0.0)
     if criterion == 'measured':
-        line = measured_line(pad)
+        line = pad.measured_limit or THESIS_LIMIT
         # A line that is above 0 at pressure 0 carries small forces without any pressure.
         p = np.maximum(line.pressure + (load - line.force) / line.slope, 0.0)
     else:
@@ -179,15 +175,9 @@ def pressure_for(
     return plain(np.where(carried, p, np.nan))
 
 
-def largest_pressure(pad: Pad, criterion: str = DEFAULT_CRITERION) -> float:
-    """Return the highest pressure for which a criterion has a force limit, Pa gauge.
-
-    This is the end of the model of the pressed dome. For ``measured`` it is at most 91.36 kPa, the
-    end of the thesis' line, if the pad has no ``measured_limit`` of its own.
-    """
-    check_criterion(pad, criterion)
-    end = _model_end(pad)[0]
-    return min(end, _end_of_measurements(pad)) if criterion == 'measured' else end
+def largest_pressure(pad: Pad) -> float:
+    """Return the end of the model of the pressed dome, up to which there are limits, Pa gauge."""
+    return _model_end(pad)[0]
 
 
 def criteria(pad: Pad) -> tuple[str, ...]:
@@ -221,13 +211,8 @@ def _model_end(pad: Pad) -> tuple[float, str]:
         from ros_pad.contact.hyperelastic import pressure_end
 
         return pressure_end(pad)
-    largest = largest_tension(signed_adhesion(pad, 'matlab'))
+    largest = largest_tension(relative_adhesion(pad))
     return largest * pad.stiffness / pad.radius, 'fold_zone'
-
-
-def measured_line(pad: Pad) -> MeasuredLimit:
-    """Return the line of measured force limits of a pad: its own, or that of the thesis."""
-    return pad.measured_limit or THESIS_LIMIT
 
 
 def resized(pad: Pad, radius: float) -> Pad:
@@ -243,15 +228,11 @@ def resized(pad: Pad, radius: float) -> Pad:
     return replace(pad, radius=radius, measured_limit=None)
 
 
-def _end_of_measurements(pad: Pad) -> float:
-    return _THESIS_END if pad.measured_limit is None else math.inf
-
-
 def _flattening(pad: Pad, p: Array) -> Array:
     """Return the force at which the contact reaches the rim, N."""
     if pad.material is not None:
         return p * (math.pi * pad.radius**2)
-    a = signed_adhesion(pad, 'matlab')
+    a = relative_adhesion(pad)
     unit = math.pi * pad.stiffness * pad.radius
     return flattening_force(p * (pad.radius / pad.stiffness), a) * unit
 

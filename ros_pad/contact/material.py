@@ -7,7 +7,7 @@ The energy W is per volume of the undeformed body, which keeps its volume: λ1 �
 | law | W | parameters |
 |---|---|---|
 | ``yeoh`` | C1 J + C2 J² + C3 J³ | C1, C2, C3, Pa |
-| ``neo_hookean`` | μ/2 J | μ, Pa; or μ/2, 0, 0 as for ``yeoh`` |
+| ``neo_hookean`` | μ/2 J | μ, Pa |
 | ``mooney_rivlin`` | C10 (I1 - 3) + C01 (I2 - 3) | C10, C01, Pa |
 | ``ogden`` | Σ μi/αi (λ1^αi + λ2^αi + λ3^αi - 3) | μ1, Pa, α1, μ2, α2 and so on |
 """
@@ -97,8 +97,6 @@ class Material:
         names = LAWS[self.law]
         fits = given.size == len(names)
         fits |= self.law == 'ogden' and given.size % 2 == 0 < given.size
-        # A neo-Hookean rubber may be written as the Yeoh law that it is.
-        fits |= self.law == 'neo_hookean' and given.size == 3 and not given[1:].any()
         if given.ndim != 1 or not fits:
             more = ', mu2, alpha2 and so on' if self.law == 'ogden' else ''
             raise InvalidInput(
@@ -200,12 +198,21 @@ class Material:
 
     @cached_property
     def _modulus(self) -> float:
+        """Shear modulus of the law without its factor, Pa."""
+        kind, p = self._form
+        if kind == 'yeoh':
+            return 2.0 * p[0]
+        return 0.5 * sum(m * a for m, a in zip(p[::2], p[1::2], strict=True))
+
+    @property
+    def _form(self) -> tuple[str, tuple[float, ...]]:
+        """The law as ``yeoh`` or ``ogden``, of which the others are special cases, in Pa."""
         p = self.parameters
-        if self.law == 'ogden':
-            return 0.5 * sum(m * a for m, a in zip(p[::2], p[1::2], strict=True))
-        if self.law == 'neo_hookean' and len(p) == 1:
-            return p[0]
-        return 2.0 * (p[0] + p[1]) if self.law == 'mooney_rivlin' else 2.0 * p[0]
+        if self.law == 'neo_hookean':
+            return 'yeoh', (0.5 * p[0], 0.0, 0.0)
+        if self.law == 'mooney_rivlin':
+            return 'ogden', (2.0 * p[0], 2.0, -2.0 * p[1], -2.0)
+        return self.law, p
 
     @cached_property
     def range_end(self) -> float:
@@ -221,14 +228,11 @@ class Material:
     @cached_property
     def unit_law(self) -> tuple[str, tuple[float, ...]]:
         """The law as ``yeoh`` or ``ogden``, and parameters over the shear modulus (no unit)."""
-        p, mu = self.parameters, self._modulus
-        if self.law == 'mooney_rivlin':
-            return 'ogden', (2.0 * p[0] / mu, 2.0, -2.0 * p[1] / mu, -2.0)
-        if self.law == 'ogden':
-            return 'ogden', tuple(
-                each if k % 2 else each / mu for k, each in enumerate(self.parameters)
-            )
-        return 'yeoh', (0.5, 0.0, 0.0) if len(p) == 1 else tuple(each / mu for each in p)
+        kind, p = self._form
+        exponents = kind == 'ogden'  # every second parameter
+        return kind, tuple(
+            each if exponents and k % 2 else each / self._modulus for k, each in enumerate(p)
+        )
 
     def _check_factor(self) -> None:
         value = number('factor', self.factor, '', *FACTORS)

@@ -173,20 +173,17 @@ class Measurements:
             row = _row(where, header, cells)
             rows[_kind(where, row)].append(row)
 
-        def column(kind: str, name: str) -> Array:
-            return np.array([row.get(name, math.nan) for row in rows[kind]], dtype=np.float64)
-
         def columns(kind: str, names: tuple[str, ...]) -> list[Array]:
-            return [column(kind, name) for name in names]
+            return [np.array([row.get(name, math.nan) for row in rows[kind]]) for name in names]
 
-        wet = column('friction', SURFACE) == 1.0
-        forces = {n: column('friction', n) for n in Friction._fields if n != 'wet'}
+        names = ('pressure', 'load', 'tangential_force', SURFACE, 'stance_time')
+        pressure, load, force, surface, stance_time = columns('friction', names)
         return cls(
             source=source,
             free=FreeDomes(*columns('free', FreeDomes._fields)),
             pressed=PressedDomes(*columns('pressed', PressedDomes._fields)),
             force_limits=ForceLimits(*columns('limit', ForceLimits._fields)),
-            friction=Friction(**forces, wet=wet),
+            friction=Friction(pressure, load, force, surface == 1.0, stance_time),
         )
 
 

@@ -210,7 +210,6 @@ def hysteresis_force(
     surface_tension: npt.ArrayLike,
     advancing_angle: npt.ArrayLike,
     receding_angle: npt.ArrayLike,
-    shape_factor: npt.ArrayLike = 1.0,
 ) -> Floats:
     """Return the largest lateral force of a pinned contact line, N. Arrays broadcast.
 
@@ -223,9 +222,6 @@ def hysteresis_force(
     advancing_angle, receding_angle : float or array
         Contact angles at which the line starts to move forwards and backwards, rad, from 0 to pi;
         advancing >= receding.
-    shape_factor : float or array
-        Factor K, from pi/4 (cosine of the contact angle proportional to the cosine of the azimuth)
-        to 1 (two constant angles, one for each half of the line), which is the upper bound.
 
     Returns
     -------
@@ -239,7 +235,9 @@ def hysteresis_force(
 
     Notes
     -----
-    ``K γ w (cos θ_receding - cos θ_advancing)`` with w twice the contact radius. The tangential
+    ``γ w (cos θ_receding - cos θ_advancing)`` with w twice the contact radius, which is the upper
+    bound: two constant angles, one for each half of the line. A cosine of the contact angle in
+    proportion to the cosine of the azimuth has pi/4 of it. The tangential
     force of a symmetric ring is zero, so a ring can resist motion by this hysteresis only. 3.82
     without its second radius is this bound for angles of 180 and 0 degrees.
 
@@ -252,13 +250,12 @@ def hysteresis_force(
     tension = quantity('surface_tension', surface_tension, 'N/m', above=True)
     ahead = quantity('advancing_angle', advancing_angle, 'rad', high=math.pi)
     back = quantity('receding_angle', receding_angle, 'rad', high=math.pi)
-    factor = quantity('shape_factor', shape_factor, '(factor)', low=0.25 * math.pi, high=1.0)
-    names = 'contact_radius, surface_tension, angles and shape_factor'
-    r, tension, ahead, back, factor = broadcast(names, r, tension, ahead, back, factor)
+    names = 'contact_radius, surface_tension and angles'
+    r, tension, ahead, back = broadcast(names, r, tension, ahead, back)
     quantity('advancing_angle - receding_angle', ahead - back, 'rad')
     # cos(back) - cos(ahead), without cancellation.
     drop = 2.0 * np.sin(0.5 * (ahead + back)) * np.sin(0.5 * (ahead - back))
-    return plain(factor * tension * 2.0 * r * drop)
+    return plain(tension * 2.0 * r * drop)
 
 
 def capillary_pull(

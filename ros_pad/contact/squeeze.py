@@ -32,8 +32,6 @@ from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, NoSurface
 
 _STIFFEST = 1e-6  # of the initial film: a smaller dimple is lost in rounding
-# Rings are narrow near the rim of the contact, over this share of the contact's radius.
-_FLAT_RIM, _CURVED_RIM = 1e-4, 0.03
 
 
 class Squeezed(NamedTuple):
@@ -139,13 +137,7 @@ class HalfSpace:
         -------
         float
             Radius, m, by Hertz, or that of the sole if it is flat.
-
-        Raises
-        ------
-        InvalidInput
-            When the load is negative or not finite.
         """
-        load = number('load', load, 'N')
         if self.curvature == 0.0:
             return self.radius
         return float((0.75 * load / (self.curvature * self.modulus)) ** (1.0 / 3.0))
@@ -228,13 +220,8 @@ class Membrane:
         -------
         float
             Radius, m.
-
-        Raises
-        ------
-        InvalidInput
-            When the load is negative or not finite.
         """
-        return math.sqrt(number('load', load, 'N') / (math.pi * self.pressure))
+        return math.sqrt(load / (math.pi * self.pressure))
 
     def deflection(self, edges: Array, at: Array) -> Array:
         """Return the deflection at radii by unit pressure on each ring.
@@ -402,12 +389,11 @@ def trapped_film(radius: float, modulus: float, pressure: float) -> float:
 
 
 def _edges(rings: int, surface: HalfSpace | Membrane, load: float) -> Array:
-    """Return the edges of the rings, 0 to 1."""
-    if surface.curvature == 0.0:
-        rim, width = 1.0, _FLAT_RIM
-    else:
+    """Return the edges of the rings, 0 to 1: they are narrow near the rim of the contact."""
+    rim, width = 1.0, 1e-4
+    if surface.curvature > 0.0:
         rim = surface.contact_radius(load) / surface.radius
-        width = _CURVED_RIM * rim
+        width = 0.03 * rim
         if rim > 1.0 / 1.5:
             raise InvalidInput(
                 f'radius = {surface.radius:g} m is not allowed: at least 1.5 times the radius of'

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.contact import Design, rise_height
-from ros_pad.contact.candidates import Candidate, Span
+from ros_pad.contact.design import Candidate, Span
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.style import BLACK, BLUE, VERMILION, WIDE, legend
 

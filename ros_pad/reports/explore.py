@@ -285,7 +285,7 @@ def _criterion(inputs: Inputs, pad: Pad, parts: _Parts) -> str:
 
 
 def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
-    end, ceiling = largest_pressure(pad, criterion), inputs['supply']
+    end, ceiling = largest_pressure(pad), inputs['supply']
     if ceiling >= end:
         ceiling = float(math.floor(end))
         parts.note(
@@ -331,7 +331,7 @@ def _limits(pad: Pad, pressure: float) -> dict[str, float]:
     """Return the force limit of a pad by criterion, N; NaN above a criterion's last pressure."""
     return {
         each: contact.force_limit(pad, pressure, each)
-        if pressure < largest_pressure(pad, each)
+        if pressure < largest_pressure(pad)
         else math.nan
         for each in criteria(pad)
     }

@@ -60,7 +60,7 @@ def like(pad: Pad, stiffer: float = 1.0, radius: float = 1.0) -> Pad:
 def limit(pad: Pad, pressure: float, criterion: str) -> float | None:
     """Return a force limit, N; None where the pad has none."""
     try:
-        known = criterion in criteria(pad) and pressure <= largest_pressure(pad, criterion)
+        known = criterion in criteria(pad) and pressure <= largest_pressure(pad)
         return float(force_limit(pad, pressure, criterion)) if known else None
     except NoEquilibrium:
         return None

@@ -93,7 +93,7 @@ def liquid_at(tension: float, degrees: float) -> Liquid:
 @functools.cache
 def exact(tension: float, degrees: float) -> BathMeniscus:
     """Return the exact meniscus round the dome."""
-    return bath_meniscus(*dome(), liquid=liquid_at(tension, degrees))
+    return bath_meniscus(Wall.dome(*dome()), liquid_at(tension, degrees))
 
 
 def exact_curvature(found: BathMeniscus, liquid: Liquid) -> float:
@@ -147,7 +147,7 @@ def bodies() -> dict[str, Found]:
         'truncated cone': cone,
     }
     found = {
-        name: Found(mesh, _by_balance(mesh), bath_meniscus(wall=wall, liquid=_HALF).height, 0.0)
+        name: Found(mesh, _by_balance(mesh), bath_meniscus(wall, _HALF).height, 0.0)
         for name, (mesh, wall) in walls.items()
     }
     line = lobed_surface().line[:, 2]
@@ -242,7 +242,7 @@ def _figure_27() -> Explained:
     # Equations 4.17 and 4.18 on the dome as printed, with the sign mended, and exact: forces on
     # one half, µN, and pressures, Pa
     ring = wet(Mesh.dome(*dome()), _HALF, axis=(0.0, 0.0))
-    true = bath_meniscus(*dome(), liquid=_HALF)
+    true = bath_meniscus(Wall.dome(*dome()), _HALF)
     curvature, radius = float(ring.curvature_radius[0]), float(ring.ring_radii[0])
     printed = _HALF.surface_tension * (1.0 / curvature + 1.0 / radius)
     pressures = printed, -_HALF.density * GRAVITY * true.height, float(ring.pressure[0])
@@ -392,7 +392,7 @@ def _figure_31() -> Explained:
     ax.plot(1e3 * np.array(PITCHES), 1e3 * np.array(true), 'o', color=BLACK, label='least energy')
     sphere, rest = dome()
     limit = math.sqrt(sphere**2 - rest**2) + sphere * math.cos(WATER.angle)
-    alone = bath_meniscus(sphere, rest, liquid=WATER).height
+    alone = bath_meniscus(Wall.dome(sphere, rest), WATER).height
     for level, words, x, side in (
         (limit, 'θ = slope of the wall', 9.0, 'right'),
         (alone, 'one dome alone', 3.0, 'left'),

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from ros_pad.capillary import bath_meniscus
+from ros_pad.capillary import Wall, bath_meniscus
 from ros_pad.contact.dome import inflate, press
 from ros_pad.contact.film import Film
 from ros_pad.contact.limits import force_limit, largest_pressure, resized
@@ -64,7 +64,7 @@ def _ring() -> tuple[Claim, ...]:
     ring, height = np.asarray(right.ring_radius), np.asarray(right.height)
     wrong = (2.0 * ring + height) / (2.0 * ring - height)
     domes = zip(np.asarray(pressed.sphere_radius).tolist(), b.tolist(), strict=True)
-    exact = np.array([bath_meniscus(*dome, liquid=WATER).height for dome in domes])
+    exact = np.array([bath_meniscus(Wall.dome(*dome), WATER).height for dome in domes])
     off, share = np.asarray(printed.height) / exact, b / ring
     return (
         claim('a ring of liquid', 0.0, False),
@@ -82,7 +82,7 @@ def _domes() -> tuple[Claim, ...]:
     stretch = math.sqrt(area) - 1.0
     r, k = LARGE_PAD.radius, LARGE_PAD.stiffness
     needed = TENSION['corrected'] * k / r
-    end = largest_pressure(LARGE_PAD, 'flattening')
+    end = largest_pressure(LARGE_PAD)
     widest = float(inflate(LARGE_PAD, end).sphere_radius) / r
     return (
         claim('area of a dome', (area, stretch),
@@ -152,7 +152,7 @@ def _balloons(name: str, radius: float, thickness: float, section: str) -> Claim
     sheet = Material.load('ecoflex_00_20')
     assert sheet.factor_range is not None
     low, given, high = (
-        1e-3 * largest_pressure(Pad.of(sheet.times(factor), radius, thickness), 'flattening')
+        1e-3 * largest_pressure(Pad.of(sheet.times(factor), radius, thickness))
         for factor in (sheet.factor_range[0], 1.0, sheet.factor_range[1])
     )
     walked = [1e-3 * p for p in WALKED]

@@ -265,7 +265,7 @@ def run(shape: Shape, progress: Progress) -> list[Row]:
     ]
 
     def meniscus(liquid: Liquid) -> Any:
-        return bath_meniscus(wall=shape.wall, liquid=liquid)
+        return bath_meniscus(shape.wall, liquid)
 
     methods.append((EXACT, '', meniscus, slice(None)))
     results = []

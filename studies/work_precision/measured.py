@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 
 from ros_pad.configuration import shared_folder
 from ros_pad.contact import LARGE_PAD, Material, Pad, force_limit, inflate, press
-from ros_pad.contact.calibrate import from_pressures
+from ros_pad.contact.calibrate import from_pressures, stiffness_of
 from ros_pad.contact.fits import Constant
-from ros_pad.contact.hyperelastic import highest_dome
+from ros_pad.contact.hyperelastic import highest_dome, pressure_for_height
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array, with_constant
 from studies.drawing import BLACK, GREEN, ORANGE, PALE, PURPLE, VERMILION
@@ -97,7 +97,7 @@ def points() -> Points:
 def models() -> tuple[Model, ...]:
     """Return the laws, each with its constant fitted to the free domes (cap: as in the thesis)."""
     free = thesis().free
-    stiffness = from_pressures(LARGE_PAD, 'stiffness', *free)
+    stiffness = from_pressures('stiffness', 'N/m', 1.0 / stiffness_of(LARGE_PAD, *free))
     caps = (LARGE_PAD, *_ends(LARGE_PAD, stiffness))
     material = Material.load('dragon_skin_10')
     sheet = Pad.of(material, LARGE_PAD.radius, THICKNESS)
@@ -113,7 +113,8 @@ def _fitted(pad: Pad) -> tuple[Pad, ...]:
     """Return a pad with its factor fitted to the heights that it can have, and both ends."""
     free = thesis().free
     known = free.height < highest_dome(pad)
-    factor = from_pressures(pad, 'factor', free.pressure[known], free.height[known])
+    ratio = pressure_for_height(pad, free.height[known]) / free.pressure[known]
+    factor = from_pressures('factor', '(factor)', ratio)
     return (with_constant(pad, factor.name, factor.value), *_ends(pad, factor))
 
 
@@ -136,7 +137,7 @@ def _row(pad: Pad, model: str, measured: Points) -> Array:
     found = np.full(len(kind), np.nan)
     free, gap, radius, limit = (kind == place for place in range(4))
     found[free] = inflate(pad, p[free]).height
-    states = press(pad, p[gap], force[gap], adhesion='none', model=model)
+    states = press(replace(pad, adhesion_energy=0.0), p[gap], force[gap], model)
     found[gap], found[radius] = states.gap, states.contact_radius
     found[limit] = _limits(pad, p[limit], model)
     return found
@@ -147,9 +148,11 @@ def _limits(pad: Pad, pressure: Array, model: str) -> Array:
     if pad.material is not None or model == 'thesis':
         return np.asarray(force_limit(pad, pressure))
 
+    bare = replace(pad, adhesion_energy=0.0)
+
     def force(p: float) -> float:
         def excess(force: float) -> float:
-            return float(press(pad, p, force, adhesion='none', model=model).gap) - THICKNESS
+            return float(press(bare, p, force, model).gap) - THICKNESS
 
         return float(brentq(excess, 1e-3, 0.9 * p * math.pi * pad.radius**2))
 
@@ -176,8 +179,8 @@ def problem() -> tuple[Problem, tuple[Method, ...]]:
 
 def gap_of(model: Model) -> Callable[..., Any]:
     """Return the gap of a law as a function of pressure and force."""
-    pad = model.pads[0]
-    return lambda p, force: press(pad, p, force, adhesion='none', model=model.model).gap
+    pad = replace(model.pads[0], adhesion_energy=0.0)
+    return lambda p, force: press(pad, p, force, model.model).gap
 
 
 def draw(figure: SubFigure) -> None:

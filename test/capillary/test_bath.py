@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ros_pad.capillary.bath import Wall, bath_meniscus
-from ros_pad.contact.meniscus import WATER, Liquid
+from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.errors import InvalidInput, NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
@@ -20,18 +20,18 @@ FIBRES = json.loads((REFERENCE / 'fibre_meniscus.json').read_text())['rows']
 
 
 def unit_liquid(degrees):
-    """Return a liquid whose capillary length is 1 m where gravity is 1 m/s²."""
-    return Liquid(1.0, 1.0, density=1.0, contact_angle=math.radians(degrees))
+    """Return a liquid whose capillary length is 1 m, and whose weight is 1 N/m³."""
+    return Liquid(1.0, 1.0, density=1.0 / GRAVITY, contact_angle=math.radians(degrees))
 
 
 def rise(wall, degrees):
-    return bath_meniscus(wall=wall, liquid=unit_liquid(degrees), gravity=1.0)
+    return bath_meniscus(wall, unit_liquid(degrees))
 
 
 @pytest.mark.parametrize('row', DOMES[::3], ids=lambda row: f'{row["gl"]}-{row["gs_gl"]}')
 def test_dome_of_the_reference_table(row):
     liquid = Liquid(row['gl'], row['gs_gl'] * row['gl'])
-    found = bath_meniscus(1.55e-3, 0.583e-3, liquid=liquid)
+    found = bath_meniscus(Wall.dome(1.55e-3, 0.583e-3), liquid)
     assert found.height == pytest.approx(row['exact_bath'], rel=1e-9)
     assert found.status == 'ok'
 
@@ -92,7 +92,7 @@ def test_force_is_pull_and_suction():
     suction = 2.0 * math.pi * lean * (rest * h**2 / 2.0 + lean * h**3 / 3.0)
     pull = 2.0 * math.pi * found.radius * math.sin(found.slope)
     assert found.force == pytest.approx(pull + suction, rel=1e-10)
-    assert found.pressure == -h
+    assert found.pressure == pytest.approx(-h, rel=1e-15)
     # The volume between surface and wall, by quadrature.
     under = np.trapezoid if hasattr(np, 'trapezoid') else np.trapz
     surface = -math.pi * under(found.heights * 2.0 * found.radii, -found.radii)
@@ -145,9 +145,6 @@ def test_of_several_the_first_from_the_floor_is_taken():
         (lambda: Wall.cone(1e-3, 0.0), 'inclination'),
         (lambda: Wall.through([1e-3], [0.0]), 'radii'),
         (lambda: Wall.through([1e-3, 1e-3], [1e-3, 0.0]), 'heights'),
-        (lambda: bath_meniscus(1e-3, liquid=WATER), 'contact_radius'),
-        (lambda: bath_meniscus(1e-3, 1e-4, liquid=WATER, wall=Wall.cylinder(1.0)), 'wall'),
-        (lambda: bath_meniscus(1e-3, 1e-4, liquid=WATER, gravity=0.0), 'gravity'),
     ],
 )
 def test_bad_input(call, name):

@@ -265,12 +265,8 @@ def test_slices_that_do_not_meet_the_wall_once_are_refused():
 @pytest.mark.parametrize(
     ('options', 'part'),
     [
-        ({'balance': 'best'}, "balance = 'best'"),
-        ({'layers': 3}, 'layers = 3'),
-        ({'slices': 2}, 'slices = 2'),
         ({'axis': (0.0,)}, 'axis = (0.0,)'),
         ({'axis': (0.0, math.nan)}, 'axis = nan'),
-        ({'liquid': 'water'}, "liquid = 'water'"),
     ],
 )
 def test_what_is_asked_is_checked(dome: Mesh, options, part: str):
@@ -362,10 +358,6 @@ def test_pads_that_do_not_fit_are_refused():
     mesh = Mesh.dome(1.5e-3, 0.5e-3)
     with pytest.raises(MeshError, match='the pads overlap'):
         wet_pattern(mesh, WATER, area=10 * math.pi * 1.4e-3**2, pads=10)
-    with pytest.raises(InvalidInput, match='pads = 0'):
-        wet_pattern(mesh, WATER, area=1e-4, pads=0)
-    with pytest.raises(InvalidInput, match='area = -1'):
-        wet_pattern(mesh, WATER, area=-1.0)
 
 
 @settings(max_examples=40, deadline=None)

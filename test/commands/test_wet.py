@@ -76,7 +76,7 @@ def test_least_energy_around_one_pad(tmp_path: pathlib.Path, capsys: pytest.Capt
     asked_for = [*DOME, '--method', 'energy', '--hysteresis', '100', '60']
     figure = tmp_path / 'it.png'
     values = asked([*asked_for, '--figure', str(figure)], capsys)
-    exact = bath_meniscus(1.55e-3, 0.6e-3, liquid=WATER)
+    exact = bath_meniscus(Wall.dome(1.55e-3, 0.6e-3), WATER)
     assert abs(values['height_m'] / exact.height - 1.0) < values['height_error'][1] < 0.01
     assert values['pull_n'] == pytest.approx(exact.force, rel=2e-3)
     assert values['pressure_pa'] == pytest.approx(exact.pressure, rel=5e-3)

@@ -143,17 +143,6 @@ class TestShapes:
         assert 'lowered from 90000 to 89000 Pa' in found.warnings[1]
         assert calibrate(THESIS, FOOT).foot.ceiling == 90e3
 
-    def test_intervals_hold_the_truth_as_often_as_they_say(self):
-        p = np.linspace(30e3, 85e3, 6)
-        true = inflate(dataclasses.replace(FOOT.pad, stiffness=40.0), p).height
-        inside = 0
-        for seed in range(200):
-            noisy = true * (1 + 0.03 * np.random.default_rng(seed).standard_normal(6))
-            data = dataclasses.replace(NOTHING, free=FreeDomes(p, noisy))
-            k = constants(calibrate(data, FOOT))['stiffness']
-            inside += k.low <= 40.0 <= k.high
-        assert 0.90 <= inside / 200 <= 0.99
-
 
 RADIUS, THICKNESS = 1.5e-3, 4e-4
 RAW = Pad.of(Material.load('dragon_skin_10'), RADIUS, THICKNESS)
@@ -164,39 +153,26 @@ class TestPressures:
 
     known = json.loads((REFERENCE / 'hyper_thesis.json').read_text())['thesis']
 
-    @staticmethod
-    def reference(law):
-        rows = json.loads((REFERENCE / 'hyper_free.json').read_text())['rows']
-        kept = [row for row in rows if row['law'] == law and row['radius_m'] == RADIUS]
-        return [np.array([row[key] for row in kept]) for key in ('pressure_Pa', 'height_m')]
-
     def test_pressures_for_heights_are_those_of_the_reference_rows(self):
-        pressure, height = self.reference('DS10_raw_l4.5')
+        rows = json.loads((REFERENCE / 'hyper_free.json').read_text())['rows']
+        kept = [r for r in rows if (r['law'], r['radius_m']) == ('DS10_raw_l4.5', RADIUS)]
+        pressure, height = (
+            np.array([r[key] for r in kept]) for key in ('pressure_Pa', 'height_m')
+        )
         assert len(pressure) == 3
         np.testing.assert_allclose(pressure_for_height(RAW, height), pressure, rtol=1e-9)
-        known = pressure_for_height(RAW, THESIS.free.height)
-        np.testing.assert_allclose(known, self.known['computed_Pa'], atol=5.0)
 
     def test_the_factor_of_the_thesis_pad(self):
         """By hand: shares x = 1/ratio, factor Σx/Σx², Student's t = 3.182 on 3 degrees."""
-        factor = from_pressures(RAW, 'factor', *THESIS.free)
+        ratio = pressure_for_height(RAW, THESIS.free.height) / THESIS.free.pressure
+        factor = from_pressures('factor', '', ratio)
         x = 1.0 / np.array(self.known['ratio'])
         value = x.sum() / (x @ x)
-        assert value == pytest.approx(self.known['factor'], abs=0.005)
         assert factor.value == pytest.approx(value, rel=5e-4)
         missed = value * x - 1.0
         width = 3.182446 * math.sqrt(missed @ missed / 3 / (x @ x)) / value
         assert math.log(factor.high / value) == pytest.approx(width, rel=0.02)
         assert math.log(value / factor.low) == pytest.approx(width, rel=0.02)
-
-    @pytest.mark.parametrize(
-        ('name', 'highest'),
-        [('ecoflex_00_30', '0.002185'), ('dragon_skin_10', '0.002694')],
-    )
-    def test_heights_that_no_dome_has_are_refused(self, name, highest):
-        pad = Pad.of(Material.load(name), RADIUS, THICKNESS)
-        with pytest.raises(InvalidInput, match=f'height = 0.0035 .* to {highest}.* m is needed'):
-            pressure_for_height(pad, np.array([1e-3, 3.5e-3]))
 
 
 class TestMaterial:
@@ -346,21 +322,9 @@ def text_of(tmp_path, text):
     return Measurements.read(path)
 
 
-@pytest.mark.parametrize(
-    ('text', 'complaint'),
-    [
-        ('pressure [kPa],height [mm]\n0,1\n', 'pressure of a free dome = 0\\.0 '),
-        ('pressure [kPa],force [N],gap [mm]\n0,0.1,1\n', 'pressure of a pressed dome = 0\\.0 '),
-        ('pressure [kPa],force [N],gap [mm]\n75,0.1,0\n', 'gap = 0\\.0 '),
-        (
-            'pressure [kPa],force [N],height [mm]\n75,0.1,0\n',
-            'height of a pressed dome = 0\\.0 ',
-        ),
-    ],
-)
-def test_zeros_cannot_be_fitted(tmp_path, text, complaint):
-    with pytest.raises(InvalidInput, match=rf'mine\.csv: {complaint}'):
-        calibrate(text_of(tmp_path, text), FOOT)
+def test_a_free_dome_without_pressure_is_refused(tmp_path):
+    with pytest.raises(InvalidInput, match=r'mine\.csv: pressure of a free dome = 0\.0 '):
+        calibrate(text_of(tmp_path, 'pressure [kPa],height [mm]\n0,1\n'), FOOT)
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact import Material
-from ros_pad.contact.candidates import candidates
-from ros_pad.errors import InvalidInput
+from ros_pad.contact.design import candidates
 
 RADIUS, THICKNESS = 1.5e-3, 4e-4
 AREA = 20 * 4.5 * math.sqrt(3.0) * RADIUS**2  # 20 cells
@@ -62,19 +61,3 @@ def test_a_factor_inside_the_range_may_decide():
     found = one(20 * 0.25, RAW, **rules)
     assert found.carried == 'in doubt'
     assert found.pressure.low < 60e3 < found.pressure.high
-
-
-@pytest.mark.parametrize(
-    ('rules', 'words'),
-    [
-        ({'load': 0.0}, 'load = 0'),
-        ({'thickness': 2e-3}, r'thickness = 0\.002 .* up to 0\.0015 m'),
-        ({'ceiling': 0.0}, 'ceiling = 0'),
-        ({'margin': -1.0}, 'margin = -1'),
-        ({'criterion': 'max_depth'}, "criterion = 'max_depth'"),
-        ({'pads': 0}, 'pads = 0'),
-    ],
-)
-def test_bad_input(rules, words):
-    with pytest.raises(InvalidInput, match=words):
-        one(**({'load': 1.0} | rules))

@@ -170,12 +170,7 @@ def test_share_of_dry_contact():
 @pytest.mark.parametrize(
     'changed, words',
     [
-        ({'initial': 0.0}, 'initial = 0.0 .* m'),
-        ({'load': -1.0}, 'load = -1.0 .* N'),
         ({'time': [0.1, 0.1]}, 'time = .* rising'),
-        ({'time': -1.0}, 'time = -1.0 .* s'),
-        ({'rings': 5}, 'rings = 5 .* 10 to 2000'),
-        ({'tolerance': 1.0}, 'tolerance = 1.0'),
         ({'surface': HalfSpace(RADIUS, 1e13)}, 'it is rigid, use film_thickness'),
         ({'surface': Membrane(1e-3, 50.0, 1e5)}, r'radius = 0.001 m .* 0.001466 m, is needed'),
     ],
@@ -184,17 +179,3 @@ def test_refused(changed, words):
     values = {'surface': HalfSpace(RADIUS, MODULUS), 'initial': 3e-4, 'time': [0.1], 'load': LOAD}
     with pytest.raises(InvalidInput, match=words):
         squeeze(**(values | changed))
-
-
-@pytest.mark.parametrize(
-    'make, words',
-    [
-        (lambda: HalfSpace(0.0, 1e5), 'radius = 0.0 .* m'),
-        (lambda: HalfSpace(1e-3, -1.0), 'modulus = -1.0 .* Pa'),
-        (lambda: Membrane(1e-3, 0.0, 1.0), 'tension = 0.0 .* N/m'),
-        (lambda: trapped_film(1e-3, 1e5, -1.0), 'pressure = -1.0 .* Pa'),
-    ],
-)
-def test_surfaces_refused(make, words):
-    with pytest.raises(InvalidInput, match=words):
-        make()
