@@ -124,7 +124,8 @@ def _shapes(pad: contact.Pad, options: argparse.Namespace) -> Iterator[tuple[str
     pressure, force = options.pressure, options.force
     free = contact.inflate(pad, pressure)
     yield 'free', values(free, 'height', 'sphere_radius', 'volume')
-    pressed = contact.press(pad, pressure, force, options.model)
+    adhesion = 'matlab' if pad.material is None else 'none'
+    pressed = contact.press(pad, pressure, force, adhesion, options.model)
     names = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap', 'status')
     yield 'pressed', values(pressed, *names)
     if not force > 0.0:  # the ring around a dome without load is too small to compute

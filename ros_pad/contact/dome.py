@@ -2,9 +2,8 @@
 """Shape of an inflated pad, free (thesis 3.34-3.41, 3.60) and pressed on a floor (3.44-3.61).
 
 Units inside this module: lengths are divided by the pad radius, pressure is ``P = p r/k``, force
-is ``f = F/(pi k r)`` and adhesion is ``a = adhesion_energy/k``. In these units all pads are the
-same, and pi appears only in the force. Adhesion attracts, as in the program in the appendix of the
-thesis.
+is ``f = F/(pi k r)`` and adhesion is ``a = sign * adhesion_energy/k``. In these units all pads are
+the same, and pi appears only in the force.
 """
 
 from __future__ import annotations
@@ -20,6 +19,8 @@ from ros_pad.configuration import choice, instance, number, quantity
 from ros_pad.contact.pad import Array, Floats, Pad, broadcast
 from ros_pad.errors import NoEquilibrium
 
+# Sign of the adhesion term: the program in the appendix of the thesis adds this term.
+ADHESION_SIGNS = {'matlab': 1.0, 'none': 0.0}
 MODELS = ('thesis', 'membrane')
 
 # Pressure ``P`` from which on the free dome grows without limit and has no equilibrium.
@@ -145,6 +146,7 @@ def press(
     pad: Pad,
     pressure: npt.ArrayLike,
     force: npt.ArrayLike,
+    adhesion: str = 'matlab',
     model: str = 'thesis',
 ) -> Pressed:
     """Compute the dome of a pad pressed on a floor, on the branch of the free dome.
@@ -160,10 +162,12 @@ def press(
         ``pressure pi radius²``.
     force : float or array
         Normal force on this one pad, N, from 0. Broadcasts with the pressure.
+    adhesion : {'matlab', 'none'}
+        Adhesion that attracts, as in the thesis' program (default), or none. The membrane has
+        none: it meets the floor at a tangent.
     model : {'thesis', 'membrane'}
         The spherical dome of thesis 3.44-3.61, or the exact membrane of the same energy
-        (:mod:`ros_pad.contact.membrane`), which meets the floor at a tangent: it has no adhesion.
-        A pad of a material is an exact membrane in both cases
+        (:mod:`ros_pad.contact.membrane`). A pad of a material is an exact membrane in both cases
         (:mod:`ros_pad.contact.hyperelastic`).
 
     Returns
@@ -180,8 +184,8 @@ def press(
         ``no_inflation`` (pressure at which even the free dome has no equilibrium) or
         ``out_of_range`` (pressure at which the free dome is outside the material's range).
     InvalidInput
-        When a value is negative or not finite, shapes do not broadcast, ``model`` is unknown, or
-        ``adhesion_energy`` is above 0.01 ``stiffness``.
+        When a value is negative or not finite, shapes do not broadcast, ``adhesion`` or ``model``
+        is unknown, or ``adhesion_energy`` is above 0.01 ``stiffness``.
 
     Notes
     -----
@@ -203,6 +207,7 @@ def press(
     """
     instance('pad', pad, Pad)
     choice('model', model, MODELS)
+    choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
     p, load = quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N')
     p, load = broadcast('pressure and force', p, load)
     rows = pad, np.ravel(p), np.ravel(load)
@@ -215,7 +220,7 @@ def press(
 
         lengths, code, most = press_membrane(*rows)
     else:
-        lengths, code, most = _press_caps(*rows, relative_adhesion(pad))
+        lengths, code, most = _press_caps(*rows, signed_adhesion(pad, adhesion))
     return Pressed(
         *_told(
             (lengths * pad.radius, code, most),
@@ -293,11 +298,11 @@ def _inflate_caps(pad: Pad, p: Array) -> Solved:
 # --- the pressed dome ----------------------------------------------------------------------------
 
 
-def relative_adhesion(pad: Pad) -> float:
+def signed_adhesion(pad: Pad, adhesion: str) -> float:
     """Return the relative adhesion ``a`` of a pad; raise `InvalidInput` above 0.01."""
     most = 0.01 * pad.stiffness  # up to there the branch structure was checked
     number('adhesion_energy', pad.adhesion_energy, 'J/m²', high=most)
-    return pad.adhesion_energy / pad.stiffness
+    return ADHESION_SIGNS[adhesion] * pad.adhesion_energy / pad.stiffness
 
 
 def largest_tension(a: float) -> float:

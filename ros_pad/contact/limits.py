@@ -31,7 +31,7 @@ from ros_pad.contact.dome import (
     inflate,
     largest_tension,
     press,
-    relative_adhesion,
+    signed_adhesion,
 )
 from ros_pad.contact.pad import LARGE_PAD, Array, Floats, MeasuredLimit, Pad, broadcast, plain
 from ros_pad.contact.roots import rising_root
@@ -211,7 +211,7 @@ def _model_end(pad: Pad) -> tuple[float, str]:
         from ros_pad.contact.hyperelastic import pressure_end
 
         return pressure_end(pad)
-    largest = largest_tension(relative_adhesion(pad))
+    largest = largest_tension(signed_adhesion(pad, 'matlab'))
     return largest * pad.stiffness / pad.radius, 'fold_zone'
 
 
@@ -232,7 +232,7 @@ def _flattening(pad: Pad, p: Array) -> Array:
     """Return the force at which the contact reaches the rim, N."""
     if pad.material is not None:
         return p * (math.pi * pad.radius**2)
-    a = relative_adhesion(pad)
+    a = signed_adhesion(pad, 'matlab')
     unit = math.pi * pad.stiffness * pad.radius
     return flattening_force(p * (pad.radius / pad.stiffness), a) * unit
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from ros_pad import configuration
 from ros_pad.configuration import Table
-from ros_pad.contact.dome import BURST, largest_tension, relative_adhesion
+from ros_pad.contact.dome import BURST, largest_tension, signed_adhesion
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.limits import criteria, force_limit
 from ros_pad.contact.pad import Pad, need_stiffness
@@ -141,7 +141,7 @@ def _inflation(table: Table, foot: Foot) -> Numbers:
 def _press(table: Table, foot: Foot) -> Numbers:
     """Read the test in which an inflated pad is pressed on a plate (thesis 3.2.1)."""
     pad = foot.pad
-    end = largest_tension(relative_adhesion(pad)) * pad.stiffness / pad.radius
+    end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
     pressure = table.number('pressure', 'Pa', 1e3, end)
     force = ('N', 0.0, pressure * math.pi * pad.radius**2)  # pressed flat
     text: Numbers = {}

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import mpmath
@@ -34,7 +34,6 @@ from studies.work_precision import measured
 from studies.work_precision.comparison import WIDTH, Method, Problem, Result, draw, inches, run
 
 PAD = LARGE_PAD
-BARE = replace(PAD, adhesion_energy=0.0)
 BASELINE = 'fsolve, good start'
 _R, _K, _ADHESION = PAD.radius, PAD.stiffness, PAD.adhesion_energy
 # Relative distance of a good start from the root.
@@ -337,10 +336,10 @@ GAP_METHODS = (
         batch=True,
         ours=True,
     ),
-    Method('press, spherical cap', lambda p, f: press(BARE, p, f).gap, ours=True),
+    Method('press, spherical cap', lambda p, f: press(PAD, p, f, 'none').gap, ours=True),
     Method(
         'press, spherical cap, batch',
-        lambda p, f: press(BARE, p, f).gap,
+        lambda p, f: press(PAD, p, f, 'none').gap,
         batch=True,
         ours=True,
     ),

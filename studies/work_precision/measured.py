@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -137,7 +137,7 @@ def _row(pad: Pad, model: str, measured: Points) -> Array:
     found = np.full(len(kind), np.nan)
     free, gap, radius, limit = (kind == place for place in range(4))
     found[free] = inflate(pad, p[free]).height
-    states = press(replace(pad, adhesion_energy=0.0), p[gap], force[gap], model)
+    states = press(pad, p[gap], force[gap], adhesion='none', model=model)
     found[gap], found[radius] = states.gap, states.contact_radius
     found[limit] = _limits(pad, p[limit], model)
     return found
@@ -148,11 +148,9 @@ def _limits(pad: Pad, pressure: Array, model: str) -> Array:
     if pad.material is not None or model == 'thesis':
         return np.asarray(force_limit(pad, pressure))
 
-    bare = replace(pad, adhesion_energy=0.0)
-
     def force(p: float) -> float:
         def excess(force: float) -> float:
-            return float(press(bare, p, force, model).gap) - THICKNESS
+            return float(press(pad, p, force, adhesion='none', model=model).gap) - THICKNESS
 
         return float(brentq(excess, 1e-3, 0.9 * p * math.pi * pad.radius**2))
 
@@ -179,8 +177,8 @@ def problem() -> tuple[Problem, tuple[Method, ...]]:
 
 def gap_of(model: Model) -> Callable[..., Any]:
     """Return the gap of a law as a function of pressure and force."""
-    pad = replace(model.pads[0], adhesion_energy=0.0)
-    return lambda p, force: press(pad, p, force, model.model).gap
+    pad = model.pads[0]
+    return lambda p, force: press(pad, p, force, adhesion='none', model=model.model).gap
 
 
 def draw(figure: SubFigure) -> None:

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import dataclasses
 import functools
 import math
 
@@ -14,7 +13,6 @@ from ros_pad.errors import NoEquilibrium
 
 press_membrane = functools.partial(press, model='membrane')
 LENGTHS = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap')
-BARE = dataclasses.replace(LARGE_PAD, adhesion_energy=0.0)
 UNIT = Pad(1.0, 1.0)  # then pressure is P, and force is pi P times the share in contact
 
 # Pressure P and share of the pad in contact: one rectangle up to the cusp and one beyond it.
@@ -78,6 +76,15 @@ def balanced(psi, share):
 
 
 class TestAgainstOtherMethods:
+    @pytest.mark.parametrize(
+        ('force', 'gap'), [(0.08, 1.350e-3), (0.19, 0.756e-3), (0.285, 0.354e-3)]
+    )
+    def test_states_of_the_appendix(self, force, gap):
+        assert press_membrane(LARGE_PAD, 75e3, force).gap == pytest.approx(gap, abs=0.9e-6)
+        thesis = press(LARGE_PAD, 75e3, force, adhesion='none')
+        exact = press(LARGE_PAD, 75e3, force, model='membrane')
+        assert exact.contact_radius == pytest.approx(thesis.contact_radius, rel=1e-14)
+
     @pytest.mark.slow
     @pytest.mark.parametrize(
         ('pressure', 'share'),
