@@ -54,7 +54,7 @@ class RailLeg:
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
         instance('scene', scene, Scene)
         instance('floor', floor, Floor)
-        self._body, self._gait = scene.on_rail
+        self._rail = scene.on_rail
         number('period', period, 's', above=True)
         self.period = period
         self.time = 0.0
@@ -65,9 +65,8 @@ class RailLeg:
         self._foot = scene.foot.on_rough(scene.floor.roughness)
         self._film = Film(self._foot, scene.floor.viscosity)
         self._x = self.speed = 0.0
-        self._offset = self._gait.stroke / 2.0
         self.feet[0].standing = True
-        self._film.touch_down(floor.depth(self._offset, 0.0))
+        self._film.touch_down(floor.depth(self.plan(0.0)[1], 0.0))
 
     @property
     def body(self) -> Vector:
@@ -87,7 +86,7 @@ class RailLeg:
         tuple
             Whether the foot stands, its distance ahead of the body, m, and its height, m.
         """
-        gait = self._gait
+        _, gait = self._rail
         since = max(0.0, time - self._scene.settle) % gait.cycle
         if since < gait.stance:
             return True, 0.5 * gait.stroke * math.cos(math.pi * since / gait.stance), 0.0
@@ -114,13 +113,14 @@ class RailLeg:
             When the sequence is not one finite pressure.
         """
         check_pressures(pressures, 1)
-        dt, state, foot, body = self.period, self.feet[0], self._foot, self._body
+        dt, state, foot, (body, _) = self.period, self.feet[0], self._foot, self._rail
+        before = self.plan(self.time)[1]
         self.time = (round(self.time / dt) + 1) * dt
         stands, offset, height = self.plan(self.time)
-        back = (self._offset - offset) / dt
+        back = (before - offset) / dt
         if stands and not state.standing:
             self._film.touch_down(self._floor.depth(self._x + offset, 0.0))
-        state.standing, self._offset = stands, offset
+        state.standing = stands
         cap = 0.0
         overloaded = False
         if stands:
