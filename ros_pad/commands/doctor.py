@@ -302,7 +302,7 @@ def which_ros(path: str, sources: dict[str, str]) -> Finding:
 def loopback(patience: float = LOOPBACK) -> Finding:
     """Send a message from one process to another, within ``patience`` s once both have started."""
     start = [sys.executable, '-m', 'ros_pad.nodes.loopback']
-    words = [f'/ros_pad_doctor_{uuid.uuid4().hex}', uuid.uuid4().hex, '--seconds']
+    words = [f'/ros_pad_doctor_{uuid.uuid4().hex}', uuid.uuid4().hex]
     environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))}
     publisher = subprocess.Popen(
         [*start, 'publisher', *words, f'{STARTING + patience}'],

@@ -323,7 +323,7 @@ def test_the_estimator_survives_and_estimates_what_is_possible(bench, simulated)
             assert ((wetness >= 0.0) & (wetness <= 1.0)).all()
             assert (np.isfinite(friction) & (friction >= 0.0)).all()
         # A valid sample is used afterwards; at least one of these is later than the last stamp.
-        taken = node.stage.used.copy()
+        taken = np.array(node.stage.used)
         for second in (100, 200_000):
             bench.give(topics.SAMPLE, sample(second * SECOND))
         assert (node.stage.used > taken).all()

@@ -16,7 +16,7 @@ class Normal:
     friction = 0.5, 0.1
     wet_probability = 0.2
 
-    def quantiles(self, shares):
+    def quantile(self, shares):
         return stats.norm.ppf(shares, 0.5, 0.1)
 
 
