@@ -78,13 +78,14 @@ class _Arrivals:
             self.place = x, y
         if fz <= LARGEST_FORCE and not fz <= self.load and fz > -math.inf:
             self.load = fz
-        if fx != fx or fy != fy or fz != fz:  # NaN
+        nan = fx != fx or fy != fy or fz != fz
+        if nan and math.inf not in (abs(fx), abs(fy), abs(fz)):
             return None
         if self._joints:
             self._miss(doubt.NO_VELOCITY)
             if math.inf in (xx, yy):
                 vx, vy, xx, yy = 0.0, 0.0, math.inf, math.inf
-            variance = max(xx, yy)
+            variance = max(xx, yy) if min(xx, yy) >= 0.0 else min(xx, yy)  # refused below 0
             if not new or math.isnan(xx + yy) or math.isnan(vx + vy):
                 return None
         else:

@@ -3,6 +3,7 @@
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -158,11 +159,20 @@ def test_an_infinite_variance_is_a_doubt():
     assert stage.samples == 2
 
 
-@pytest.mark.parametrize(('name', 'value'), [('variance', -1e-4), ('velocity', math.inf)])
-def test_a_variance_below_zero_and_an_infinite_velocity_are_refused(name, value):
+@pytest.mark.parametrize(
+    ('name', 'value', 'words'),
+    [
+        ('variance', (-1e-4, 2.0), r'variance = -0\.0001 m²/s²'),
+        ('variance', (1e-4, -math.inf), 'variance = -inf m²/s²'),
+        ('velocity', math.inf, 'velocity x = inf m/s'),
+        ('force', (math.inf, math.nan, math.nan), 'force x = inf N'),
+    ],
+)
+def test_a_variance_below_zero_and_infinite_numbers_are_refused(name, value, words):
     stage, rejected = stage_with()
     send(stage, 4, **{name: value})
-    assert len(rejected) == 1 and not stage.samples
+    (error,) = rejected
+    assert re.search(words, str(error)) and not stage.samples
 
 
 def test_a_missing_velocity_becomes_a_fault():
