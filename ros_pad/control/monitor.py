@@ -55,24 +55,29 @@ def typical(times: Times, start: float) -> float:
 
 
 class _Changes:
-    """Times that whole fills and vents take, from the command to the set-point."""
+    """Times that fills and vents take, from the command to the set-point."""
 
     def __init__(self) -> None:
         self.commanded = 0.0  # time of the last change of the set-point
-        self.timed = False  # whether a fill or vent is being timed
+        self.distance = 0.0  # whole pressure change of the fill or vent being timed; 0 for none
         self._filling = False
         self.fills, self.vents = Times(maxlen=5), Times(maxlen=5)
 
-    def begin(self, time: float, aim: float, pressure: float, tolerance: float) -> None:
+    def begin(self, time: float, aim: float, pressure: float) -> None:
         """Time the change from a pressure to a set-point if it is more than half of a fill."""
         self.commanded, self._filling = time, aim > pressure
-        self.timed = abs(aim - pressure) > max(0.5 * max(aim, pressure), 2.0 * tolerance)
+        distance = abs(aim - pressure)
+        self.distance = distance if distance > 0.5 * max(aim, pressure) else 0.0
 
-    def end(self, time: float) -> None:
-        """End the change: the pad has arrived."""
-        if self.timed:
-            (self.fills if self._filling else self.vents).append(time - self.commanded)
-        self.timed = False
+    def learn(self, time: float, left: float, tolerance: float) -> None:
+        """Learn from a change of which a pressure is left; it is assumed to be exponential."""
+        if left > tolerance and left < 0.8 * self.distance:
+            share = math.log(self.distance / tolerance) / math.log(self.distance / left)
+        elif left <= tolerance and self.distance > 2.0 * tolerance:
+            share = 1.0
+        else:
+            return
+        (self.fills if self._filling else self.vents).append((time - self.commanded) * share)
 
 
 class _Motion:
@@ -231,6 +236,7 @@ class PadMonitor:
         if setpoint is None:
             self._wait(time)
         elif not abs(aim - last) <= self.tolerance:  # also the first one
+            self._changes.learn(before, abs(last - self.pressure), self.tolerance)
             self._set_out(before, aim, self.pressure)
         if not math.isfinite(reading):
             silent = time - self._read
@@ -251,11 +257,11 @@ class PadMonitor:
         """Begin a pressure change."""
         self._arrived = False
         self._wait(time)
-        self._changes.begin(time, aim, pressure, self.tolerance)
+        self._changes.begin(time, aim, pressure)
 
     def _wait(self, time: float) -> None:
         """Restart the comparison of readings with the set-point."""
-        self._changes.timed, self._repair.right = False, math.inf
+        self._changes.distance, self._repair.right = 0.0, math.inf
         self._motion.restart(time)
 
     def _judge(self, time: float, aim: float, last_read: float) -> None:
@@ -264,8 +270,8 @@ class PadMonitor:
         repair.highest = max(repair.highest, pressure)
         over = pressure > self._ceiling + tolerance
         if abs(pressure - aim) <= tolerance and not over:
-            self._changes.end(time)
-            self._arrived = True
+            self._changes.learn(time, 0.0, tolerance)
+            self._changes.distance, self._arrived = 0.0, True
             self._motion.restart(time)
             if self.fault and repair.done(time, aim, pressure, tolerance):
                 self.fault = None
@@ -275,7 +281,7 @@ class PadMonitor:
             self._find_fault(time, aim, over)
 
     def _find_fault(self, time: float, aim: float, over: bool) -> None:
-        self._changes.timed = False
+        self._changes.distance = 0.0
         pressure, repair = self.pressure, self._repair
         side = 1 if pressure > aim or over else -1
         if pressure < -self.tolerance:

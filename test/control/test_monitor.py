@@ -111,6 +111,17 @@ def test_it_learns_how_long_the_hose_takes():
         assert pad.watch.fill_time == whole == pytest.approx(learnt, rel=0.1)
 
 
+def test_changes_that_end_early_show_a_slow_hose():
+    """The pad fills and vents by turns of 0.5 s; its time constant is 1 s."""
+    watch = PadMonitor(CEILING)
+    pressure = 0.0
+    for step in range(500):
+        aim = 75e3 if step % 50 < 25 else 0.0
+        pressure = aim + (pressure - aim) * math.exp(-PERIOD)
+        watch.update(step * PERIOD, aim, pressure)
+    assert 2.0 < watch.fill_time < 3.0 and 2.0 < watch.vent_time < 3.0
+
+
 # Fault; set-points, Pa, each with its time, s; time from which the fault can be seen; reason.
 # A stuck valve is seen when the pad should move, a leak when the pad is out of tolerance.
 STUCK_FLAT = '{kind: stuck_valve, start: 1.0, end: 8.0}'
