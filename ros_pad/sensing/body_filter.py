@@ -27,6 +27,8 @@ GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
 # degrees of freedom.
 GATE = 16.27
 
+FASTEST = 100.0  # m/s, speed of the body above which the filter has diverged
+
 _APART = 1e2  # m²: variance of a measurement that must not count
 _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 _GYRO, _FORCE = slice(9, 12), slice(12, 15)
@@ -311,7 +313,7 @@ class BodyFilter:
         """Return whether velocity and covariance are such as a robot can have."""
         speed = float(self.velocity @ self.velocity)
         variances = _diagonal(self.covariance)
-        fine = speed < 100.0**2 and variances.min() > -1e-9 and variances.max() < math.inf
+        fine = speed < FASTEST**2 and variances.min() > -1e-9 and variances.max() < math.inf
         return bool(fine)  # false for NaN, too
 
     def apply(self, error: Array) -> None:

@@ -31,6 +31,14 @@ LONGEST_GAP = 0.2
 # gap leaves one.
 RECOVERY = 0.3
 
+# Time for which all feet may slip before the velocity is taken to be wrong, s, if their slip
+# velocities differ by less than this, m/s.
+LOST, ALIKE = 2.0, 0.03
+
+# Relative error of the length of the legs above which that of the robot's file is wrong, and its
+# deviation below which it is known again.
+WRONG_LENGTH, KNOWN_LENGTH = 0.06, 0.012
+
 # Deviation of the rotation after a time without readings of the IMU, rad.
 BLIND_TURN = 0.1
 
@@ -135,9 +143,19 @@ class BodyEstimator:
         number('radius_error', radius_error, '(share)', 0.0, 1.0)
         number('length_error', length_error, '(share)', 0.0, 0.5)
         self._given = motion.Given(
-            *(gyro_noise, accelerometer_noise, encoder_noise, velocity_noise, force_noise),
-            *(accelerometer_bias, contact_share, window, rate, force_axes),
-            *(radius_error * robot.foot_radius, length_error, rejection),
+            gyro_noise=gyro_noise,
+            accelerometer_noise=accelerometer_noise,
+            encoder_noise=encoder_noise,
+            velocity_noise=velocity_noise,
+            force_noise=force_noise,
+            accelerometer_bias=accelerometer_bias,
+            contact_share=contact_share,
+            window=window,
+            rate=rate,
+            force_axes=force_axes,
+            radius_error=radius_error * robot.foot_radius,
+            length_error=length_error,
+            rejection=rejection,
         )
         for setting in SETTINGS:
             if setting.name != 'forces':
@@ -447,9 +465,9 @@ class BodyEstimator:
         if sticking.any() or not state.standing.any():
             state.sliding_since = time
         elif (
-            time - state.sliding_since > 2.0
+            time - state.sliding_since > LOST
             and state.standing.sum() > 1
-            and np.ptp(slips[state.standing, :2], axis=0).max() < 0.03  # m/s
+            and np.ptp(slips[state.standing, :2], axis=0).max() < ALIKE
         ):
             # All feet that slip alike for so long stick, and the velocity is wrong.
             self._filter.lose()
@@ -478,7 +496,7 @@ class BodyEstimator:
         self._length.look = time + 0.25
         scale, deviation = self._filter.scale, self._filter.deviations[1]
         if self._length.stretched:
-            if deviation > 0.012:
+            if deviation > KNOWN_LENGTH:
                 self._doubts.add(
                     time,
                     'kinematics: legs seem to be longer or shorter than in the file of the'
@@ -490,7 +508,7 @@ class BodyEstimator:
         # have shown something about it.
         if not legs.sticks or learnt <= 0.05 * given.length_error**2:
             return False
-        most = max(0.06 * learnt / given.length_error**2, 4.0 * math.sqrt(learnt))
+        most = max(WRONG_LENGTH * learnt / given.length_error**2, 4.0 * math.sqrt(learnt))
         self._length.stretched = abs(scale) > most
         if self._length.stretched:
             self._filter.reshape(self._robot.foot_radius, given.radius_error, 0.0, 0.05)

@@ -28,15 +28,27 @@ SLIPPERY = 0.35
 # Share below which a foot moves with the others.
 AGREES = 0.5
 
+# Share above which a foot moves against the others, if half of all feet are below AGREES, and mean
+# speed of its contact point over that of the foot against the body from which on it does.
+AGAINST, FASTER = 0.9, 0.6
+
 # Speed of a foot against body or ground from which on it shows something, m/s.
 MOVES = 0.02
 
 # Number of readings in the air whose median is that of the sensor.
 READINGS = 20
 
-# Share of the expected load up to which readings in the air are left as they are: contacts begin
-# and end while feet move.
-NOTHING = 0.05
+# Shares of the expected load up to which readings in the air are left as they are (contacts begin
+# and end while feet move), and above which they are no error of the sensor alone.
+NOTHING, TOO_MUCH = 0.05, 0.5
+
+# Largest difference of joint positions from the sum of their velocities over half a second, rad,
+# and what is added to it, as a share of the largest motion.
+UNLIKE, UNLIKE_SHARE = 0.08, 0.3
+
+# Delay between IMU and joints above which there is a doubt, s, and standard deviations of the
+# delay that it must be above that.
+LATE, SURE = 2e-3, 2.0
 
 # Half of the time over which the gyro is differentiated, s.
 HALF = 0.008
@@ -141,7 +153,7 @@ class Unloaded:
         # Contacts that last have readings that are not alike.
         if np.median(np.abs(rows - offset), axis=0).max() > 0.15 * max(size, least):
             return
-        self._much[leg] = size > 0.5 * self._expected  # no error of the sensor alone
+        self._much[leg] = size > TOO_MUCH * self._expected
         wrong = size > least and not self._much[leg]
         self.found |= wrong and not self.offset[leg].any()
         self.offset[leg] = offset if wrong else 0.0
@@ -184,7 +196,7 @@ class Joints:
         np.maximum(self._apart, np.abs(moved - self._path), out=self._apart)
         np.maximum(self._most, np.maximum(np.abs(moved), np.abs(self._path)), out=self._most)
         if time - self._begin >= 0.5:
-            bad = (self._apart > 0.08 + 0.3 * self._most).ravel()  # rad
+            bad = (self._apart > UNLIKE + UNLIKE_SHARE * self._most).ravel()
             both = np.flatnonzero(bad & self._bad)
             self._bad, self._doubt = bad, ''
             if both.size:
@@ -276,7 +288,7 @@ class Legs:
         before = self.against
         # Where all feet slip for half of their stances, some do so nearly always.
         most = 2 * int((shares < AGREES).sum()) >= len(shares)
-        wrong = (shares > 0.9) & (means[1] > 0.6 * means[2]) & most
+        wrong = (shares > AGAINST) & (means[1] > FASTER * means[2]) & most
         wrong &= self._time > 0.5 * STANCES
         self.against = wrong | (before & (shares > AGREES))
         return bool((self.against & ~before).any())
@@ -378,7 +390,7 @@ class Delay:
 
     def doubt(self) -> str:
         """Return a doubt, or an empty text."""
-        if self._least < 2e-3 + 2.0 * self._spread:  # s
+        if self._least < LATE + SURE * self._spread:
             return ''
         word = 'later' if self.value > 0.0 else 'earlier'
         return f'delay: joints are {1e3 * abs(self.value):.0f} ms {word} than the IMU'
