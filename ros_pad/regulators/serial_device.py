@@ -28,8 +28,12 @@ OPEN_PATIENCE = 1.0
 """Longest time for which ``open`` waits for a device to answer, s."""
 
 RETRY = 0.25
-"""Time until a set-point that was refused or ignored is sent again, and a missing port or a lost
-device is tried again, s."""
+"""Time until a set-point that was refused or ignored is sent again, and a missing port is tried
+again, s."""
+
+FIRST_PAUSE, LONGEST_PAUSE = 0.05, 1.0
+"""First and longest pause between attempts to reach a lost device, s; each pause is twice as long
+as the one before, because the other devices on the bus wait during an attempt."""
 
 LONGEST_REPLY = 256
 """Longest reply, bytes; a longer one without a terminator is an error."""
@@ -110,7 +114,16 @@ class Bus:
         ------
         ConfigError
             When the port is in use with other settings, or the address is taken.
+        TransportError
+            When pyserial is not installed.
         """
+        try:
+            import serial  # noqa: F401 only serial devices need pyserial
+        except ModuleNotFoundError as error:
+            raise TransportError(
+                f'port {line.port} cannot be opened without pyserial: pip install pyserial, or'
+                ' apt install python3-serial'
+            ) from error
         with cls._registry:
             bus = cls._all.get(line.port)
             if bus is None:
@@ -200,10 +213,10 @@ class Bus:
         raise line.error(kind, what, command, answer)
 
     def _open(self) -> None:
+        import serial
+
         line = self.line
         try:
-            import serial  # only serial devices need pyserial
-
             self._port = serial.Serial(
                 line.port,
                 line.baudrate,
@@ -403,6 +416,7 @@ class SerialRegulator(ABC):
         self._refusal = ''
         self._unconfirmed = False  # whether the last set-point was sent without an answer
         self._retry_at = -math.inf
+        self._pause = FIRST_PAUSE  # used by the thread of the bus only
 
     def set_pressure(self, gauge_pa: float) -> None:
         """Request a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``.
@@ -510,7 +524,10 @@ class SerialRegulator(ABC):
                 error = TransportError(f'port {self._line.port}: {error!r}')
             self.fail(error)
             if self._frame is None:
-                return time.monotonic() + RETRY
+                pause, self._pause = self._pause, min(2.0 * self._pause, LONGEST_PAUSE)
+                return time.monotonic() + pause
+        else:
+            self._pause = FIRST_PAUSE
         return time.monotonic() + self._poll_period
 
     def fail(self, error: PadError) -> None:

@@ -37,10 +37,13 @@ class SerialTextRegulator(SerialRegulator):
         that was sent. Empty when the board sends no reply.
     read_template, read_reply : str
         Command that requests the measured value, and the reply to it, in which ``{value}`` is any
-        number, and ``{value:d}`` a whole one without a sign.
+        number, and ``{value:d}``, as in ``set_reply``, a whole one without a sign between the
+        values at 0 Pa and at ``full_scale``.
     setpoint_template : str
         Command that requests the set-point in force; the reply is as to ``set_template``. Empty
         when the board does not report it.
+    rejection : str
+        Reply to any command that the board rejects. Empty when it has none.
     terminator : str
         End of a line, in both directions: 1 to 4 ASCII characters.
     command_zero, command_full : float
@@ -76,6 +79,7 @@ class SerialTextRegulator(SerialRegulator):
         read_template: str = 'READ {channel}',
         read_reply: str = '{channel} {value}',
         setpoint_template: str = '',
+        rejection: str = '',
         terminator: str = '\n',
         command_zero: float = 0.0,
         command_full: float = 5.0,
@@ -116,6 +120,7 @@ class SerialTextRegulator(SerialRegulator):
         self._set_template = set_template
         self._read_command = _filled(read_template, channel, '')
         self._setpoint_command = _filled(setpoint_template, channel, '')
+        self._rejection = text('rejection', rejection)
         self._answers = bool(set_reply)
         self._set_reply = _pattern(set_reply, channel)
         self._read_reply = _pattern(read_reply, channel)
@@ -144,12 +149,28 @@ class SerialTextRegulator(SerialRegulator):
     ) -> float:
         """Return the pressure that a board answers to a command, gauge Pa."""
         reply, (zero, span) = query(command), scale
+        self._check_rejection(command, reply)
         found = form.fullmatch(reply)
         pressure = (float(found['value']) - zero) / span * self._full_scale if found else math.nan
-        if not math.isfinite(pressure):  # the pattern accepts 1e999, which is infinite
+        # The pattern accepts 1e999, which is infinite.
+        if not found or not math.isfinite(pressure):
             what = f'the reply does not match {form.pattern!r} with a finite value'
             raise self.error(ProtocolError, what, command, reply)
+        self._check_count(found, scale, command, reply)
         return pressure
+
+    def _check_rejection(self, command: str, reply: str) -> None:
+        if self._rejection and reply == self._rejection:
+            raise self.error(DeviceFault, 'the device rejected the command', command, reply)
+
+    def _check_count(
+        self, found: re.Match[str], scale: tuple[float, float], command: str, reply: str
+    ) -> None:
+        """Refuse a whole number beyond its scale: it is a garbled reply."""
+        low, high = sorted((scale[0], sum(scale)))
+        if 'count' in found.groupdict() and not low <= float(found['count']) <= high:
+            what = f'the reply is not a whole number from {low:g} to {high:g}'
+            raise self.error(ProtocolError, what, command, reply)
 
     def send(self, query: Query, setpoint: float) -> None:
         """Send a set-point, gauge Pa, and check the reply if there is one."""
@@ -159,10 +180,12 @@ class SerialTextRegulator(SerialRegulator):
         self._in_force = math.nan
         reply = query(command, reply=self._answers)
         if self._answers:
+            self._check_rejection(command, reply)
             found = self._set_reply.fullmatch(reply)
             if not found:
                 what = 'the reply does not match set_reply'
                 raise self.error(DeviceFault, what, command, reply)
+            self._check_count(found, self._command, command, reply)
             echo = float(found.groupdict().get('value', value))
             if not abs(echo - float(value)) < 0.5 * 10.0**-self._decimals:
                 what = f'value {value} was sent, {echo:g} is in force'
@@ -188,13 +211,14 @@ def smc_itv(
     1023; ``UNKNOWN COMMAND`` is a rejection. The device reports no faults. Source: two independent
     field programs; the maker's manual was not found.
     """
-    return SerialTextRegulator(
+    regulator = SerialTextRegulator(
         port,
         set_template='SET {value:d}',
         set_reply='{value:d}',
         read_template='MON',
         read_reply='{value:d}',
         setpoint_template='REQ',
+        rejection='UNKNOWN COMMAND',
         terminator='\r\n',
         command_full=FULL_COUNT,
         monitor_zero=0.0,
@@ -206,6 +230,8 @@ def smc_itv(
         poll_period=poll_period,
         silence=silence,
     )
+    regulator.address = 'ITV'  # it has no channels
+    return regulator
 
 
 def _decimals(set_template: str, command_zero: float) -> int:
@@ -250,12 +276,12 @@ def _filled(template: str, channel: int, value: str) -> str:
 
 
 def _pattern(template: str, channel: int) -> re.Pattern[str]:
-    """Return the pattern of a reply; its group ``value`` is the value."""
+    """Return the pattern of a reply; its group ``value``, or also ``count``, is the value."""
     parts = []
     end = 0
     for each in _FIELD.finditer(template):
         parts.append(re.escape(template[end : each.start()]))
-        number = '[0-9]+' if each[1] == 'value:d' else _VALUE
+        number = '(?P<count>[0-9]+)' if each[1] == 'value:d' else _VALUE
         parts.append(str(channel) if each[1] == 'channel' else f'(?P<value>{number})')
         end = each.end()
     return re.compile(''.join(parts) + re.escape(template[end:]))

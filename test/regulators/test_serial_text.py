@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from ros_pad.errors import ConfigError, ProtocolError
+from ros_pad.errors import ConfigError, DeviceFault, ProtocolError
 from ros_pad.regulators import Regulator, create
 
 SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
@@ -156,6 +156,28 @@ def test_a_count_of_an_itv_is_a_whole_number(reply):
     assert f"port /dev/somewhere, command 'REQ', reply {reply!r}" in str(caught.value)
 
 
+@pytest.mark.parametrize('garbled', ['REQ', 'MON', 'SET 512'])
+def test_a_count_of_an_itv_beyond_full_scale_is_no_count(garbled):
+    regulator = create('smc_itv', port='/dev/somewhere', full_scale=100e3)
+
+    def query(command, reply=True):
+        return '5512' if command == garbled else '1023'
+
+    with pytest.raises(ProtocolError, match=f"from 0 to 1023: .*'{garbled}', reply '5512'"):
+        regulator.send(query, 50e3) if garbled == 'SET 512' else regulator.poll(query)
+
+
+def test_a_rejection_by_an_itv_is_a_fault_of_the_device():
+    regulator = create('smc_itv', port='/dev/somewhere', full_scale=100e3)
+
+    def query(command, reply=True):
+        return 'UNKNOWN COMMAND'
+
+    for call in (lambda: regulator.poll(query), lambda: regulator.send(query, 50e3)):
+        with pytest.raises(DeviceFault, match='the device rejected the command: '):
+            call()
+
+
 def test_an_itv_that_is_set_by_its_analogue_input_is_a_fault(emulated, opened, until):
     device, line = emulated('smc_itv')
     regulator = opened('smc_itv', port=line.path, full_scale=100e3)
@@ -163,6 +185,7 @@ def test_an_itv_that_is_set_by_its_analogue_input_is_a_fault(emulated, opened, u
     regulator.set_pressure(60e3)
     fault = until(lambda: next(iter(regulator.read().faults), None))
     assert 'is not in force, but 0 Pa is' in fault and line.path in fault
+    assert "regulator 'ITV'" in fault
     device.faults.clear()
     until(lambda: abs(regulator.read().setpoint - 60e3) < COUNT)
     assert regulator.read().faults == ()

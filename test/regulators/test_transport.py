@@ -5,11 +5,12 @@ import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from ros_pad.errors import ConfigError, PadError, ProtocolError, TransportError
-from ros_pad.regulators import create
+from ros_pad.regulators import create, serial_device
 
 QUICK = {'reply_timeout': 0.1, 'silence': 1.0}
 
@@ -117,6 +118,19 @@ def test_a_device_that_is_lost_is_vented_when_it_is_back(emulated, opened, until
     until(lambda: regulator.read().setpoint == 30e3)
 
 
+def test_a_lost_device_is_tried_ever_more_rarely(monkeypatch):
+    monkeypatch.setattr(serial_device, 'time', SimpleNamespace(monotonic=lambda: 0.0))
+    regulator = create('serial_text', port='/dev/nowhere', poll_period=0.02)
+
+    def silent(command):
+        raise ConfigError('lost')
+
+    pauses = [0.05, 0.1, 0.2, 0.4, 0.8, 1.0, 1.0]
+    assert [regulator.take_turn(silent) for _ in pauses] == pytest.approx(pauses)
+    assert regulator.take_turn(lambda command: '1 1.0') == 0.02
+    assert regulator.take_turn(silent) == 0.05
+
+
 def test_one_bad_reply_is_no_fault(emulated, opened, until):
     device, line = emulated('alicat')
     regulator = opened('alicat', port=line.path, reply_timeout=0.2, silence=10.0)
@@ -179,6 +193,12 @@ def test_a_closed_regulator_accepts_nothing(emulated):
     for call in (regulator.read, regulator.vent, lambda: regulator.set_pressure(1e3)):
         assert 'is not open' in str(raised(call))
     regulator.close()
+
+
+def test_without_pyserial_the_error_says_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'serial', None)
+    with pytest.raises(TransportError, match='pip install pyserial'):
+        create('alicat', port='/dev/nowhere').open()
 
 
 def test_a_port_that_is_missing_or_in_use_is_an_error(emulated, opened):
