@@ -350,6 +350,8 @@ class Table:
             mark = getattr(error, 'problem_mark', None)
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
             problem = getattr(error, 'problem', None) or str(error) or type(error).__name__
+            if mark and any('\t' in row for row in text.splitlines()[mark.line : mark.line + 1]):
+                problem += ' (a tab: YAML is indented with spaces)'
             raise ConfigError(f'{origin}{place}: not valid YAML: {problem}') from error
         return cls(values, origin)
 

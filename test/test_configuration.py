@@ -143,7 +143,7 @@ def test_unknown_key_and_the_nearest(tmp_path):
             'line 1, column .*(nested more than 100 deep|maximum nesting)',
         ),
         ('- ' * 5000, 'line 1, column 201: not valid YAML: nested more than 100 deep'),
-        ('a:\n\tb: 1', 'line 2, column 1: not valid YAML'),
+        ('a:\n\tb: 1', r'line 2, column 1: .* \(a tab: YAML is indented with spaces\)'),
         ('', 'expected a table of keys, found nothing'),
         ('- 1\n- 2', 'expected a table of keys'),
         ('word', 'expected a table of keys'),

@@ -14,6 +14,7 @@ import yaml
 from mcap.records import Channel, Schema
 
 from ros_pad.bags.storage import Contents
+from ros_pad.configuration import instance, text
 from ros_pad.errors import BagError, reason
 from ros_pad.yaml_text import read_yaml
 
@@ -129,25 +130,37 @@ def annotate(folder: str | os.PathLike[str], custom_data: Mapping[str, str]) -> 
     ------
     BagError
         When the folder has no valid metadata, or the metadata cannot be written.
+    InvalidInput
+        When `custom_data` holds anything but text.
     """
+    added = texts(custom_data)
     folder = pathlib.Path(folder)
     information = read(folder)
     try:
-        information['custom_data'] = {**(information.get('custom_data') or {}), **custom_data}
+        information['custom_data'] = {**(information.get('custom_data') or {}), **added}
         _replace(folder, information)
     except (OSError, TypeError) as error:
         raise BagError(f'{folder}: {_NAME} cannot be changed: {error}') from error
 
 
+def texts(custom_data: Mapping[str, str]) -> dict[str, str]:
+    """Return a copy of custom data; raise `InvalidInput` if a key or a value is not text."""
+    instance('custom_data', custom_data, Mapping)
+    for key, value in custom_data.items():
+        text('key of custom_data', key)
+        text(f'custom_data[{key!r}]', value)
+    return dict(custom_data)
+
+
 def _replace(folder: pathlib.Path, information: Mapping[str, Any]) -> None:
     """Replace the metadata as a whole, so that a full disk or a kill leaves the earlier one."""
     new = folder / f'{_NAME}.new'
-    text = yaml.dump(
+    content = yaml.dump(
         {_ROOT: dict(information)}, Dumper=_NoAliasDumper, sort_keys=False, allow_unicode=True
     )
     try:
         with new.open('w', encoding='utf-8') as stream:
-            stream.write(text)
+            stream.write(content)
             stream.flush()
             # Otherwise the new name may reach the disk before the contents.
             os.fsync(stream.fileno())
@@ -165,4 +178,4 @@ class _NoAliasDumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ig
         return True
 
 
-__all__ = ['annotate', 'read', 'topic_metadata', 'write']
+__all__ = ['annotate', 'read', 'texts', 'topic_metadata', 'write']

@@ -249,19 +249,19 @@ class BagReader:
         times: dict[str, list[int]] = {topic: [] for topic in (*kinds, *paths)}
         wires: dict[str, Wire] = {}
         blocks: dict[str, list[Block]] = {topic: [] for topic in kinds}
-        rows: dict[str, list[tuple[Any, ...]]] = {topic: [] for topic in paths}
+        rows: dict[str, list[tuple[float, ...]]] = {topic: [] for topic in paths}
         getters = {topic: field_getter(each) for topic, each in paths.items()}
         for topic, log_time, data in self._raw(times, progress):
             try:
                 if topic in getters:
                     message = self._decoded(topic, data, log_time)
-                    rows[topic].append(getters[topic](message))
+                    rows[topic].append(tuple(map(float, getters[topic](message))))
                     times[topic].append(log_time)
                     continue
                 if topic not in wires:
                     wires[topic] = Wire(kinds[topic], legs_of(data))
                 block = wires[topic].decode(data)
-            except (BadMessage, AttributeError, IndexError) as error:
+            except (BadMessage, AttributeError, IndexError, TypeError, ValueError) as error:
                 raise BagError(f'{self.path}: a message on {topic}: {error}') from error
             blocks[topic].append(block)
             times[topic] += [log_time] * len(block.stamps)

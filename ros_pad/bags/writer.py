@@ -18,7 +18,6 @@ from mcap.writer import CompressionType, Writer
 from ros_pad.bags import metadata
 from ros_pad.bags.codec import definition_of
 from ros_pad.bags.storage import Contents, scan
-from ros_pad.configuration import instance
 from ros_pad.errors import BagError, InvalidInput
 
 CHUNK_SIZE = 192 * 1024
@@ -51,7 +50,7 @@ class BagWriter:
     BagError
         When the folder exists or cannot be created.
     InvalidInput
-        When `custom_data` is no mapping.
+        When `custom_data` holds anything but text.
 
     Attributes
     ----------
@@ -66,8 +65,7 @@ class BagWriter:
     ) -> None:
         self.folder = pathlib.Path(folder)
         self.message_count = 0
-        instance('custom_data', custom_data or {}, Mapping)
-        self._custom_data = dict(custom_data or {})
+        self._custom_data = metadata.texts({} if custom_data is None else custom_data)
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
@@ -114,7 +112,7 @@ class BagWriter:
         type_name : str
             Such as ``geometry_msgs/msg/WrenchStamped``.
         qos : str
-            The offered QoS profiles as YAML, see :func:`ros_pad.nodes.qos.offered_profiles`.
+            The offered QoS profiles as YAML, see :func:`ros_pad.nodes.qos.offered`.
 
         Raises
         ------
@@ -206,8 +204,13 @@ class BagWriter:
         ----------
         custom_data : mapping of str to str
             Texts by key, added to the earlier ones.
+
+        Raises
+        ------
+        InvalidInput
+            When `custom_data` holds anything but text.
         """
-        self._custom_data |= custom_data
+        self._custom_data |= metadata.texts(custom_data)
         self._next_flush = 0.0
 
     def flush(self) -> None:

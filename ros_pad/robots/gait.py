@@ -25,6 +25,8 @@ _LEGS: dict[str, Sequence[int]] = {
 GAITS = tuple(_LEGS)
 """Names of the gaits that :meth:`Gait.named` makes."""
 
+_RANGES = {'cycle': ('s', 0.05, 60.0), 'duty': ('(share)', 0.05, 0.95), 'lift': ('m', 0.0, 1.0)}
+
 
 @dataclass(frozen=True)
 class Gait:
@@ -57,10 +59,9 @@ class Gait:
     pushes: bool = False
 
     def __post_init__(self) -> None:
-        number('cycle', self.cycle, 's', 0.05, 60.0)
-        number('duty', self.duty, '(share)', 0.05, 0.95)
+        for name, allowed in _RANGES.items():
+            number(name, getattr(self, name), *allowed)
         quantity('phases', self.phases, '(share)', 0.0, 1.0)
-        number('lift', self.lift, 'm', 0.0, 1.0)
         if self.pushes and (sorted(set(self.phases)) != [0.0, 0.5] or self.duty <= 0.5):
             raise InvalidInput(
                 'pushes = True is not allowed: two groups of legs half a cycle apart, with a duty'
@@ -152,15 +153,16 @@ class Gait:
         """
         own = {} if usual is None else vars(usual)
         cycle, duty, lift = (
-            table.number(key, unit, **({'default': own[key]} if own else {}))
-            for key, unit in (('cycle', 's'), ('duty', '(share)'), ('lift', 'm'))
+            table.number(key, *allowed, **({'default': own[key]} if own else {}))
+            for key, allowed in _RANGES.items()
         )
         pushes = False
         try:
             if own and 'kind' not in table:
                 phases, pushes = own['phases'], own['pushes']
             elif (kind := table.choice('kind', (*GAITS, 'own'))) == 'own':
-                phases = tuple(table.vector('phases', '(share)', len(np.asarray(hips))).tolist())
+                size = len(np.asarray(hips))
+                phases = tuple(table.vector('phases', '(share)', size, 0.0, 1.0).tolist())
             else:
                 phases = cls.named(kind, hips, cycle, duty, lift).phases
             pushes = table.value(Setting('pushes', bool, ''), pushes)

@@ -103,7 +103,11 @@ def load(
     if bag.problem:
         settings['problem'] = bag.problem
     recording = read(
-        bag, settings['ambient_pressure'], namespace, progress=part(progress, 0.4, 0.8)
+        bag,
+        settings['ambient_pressure'],
+        namespace,
+        progress=part(progress, 0.4, 0.8),
+        by_stamp=True,
     )
     settings['late'] = []
     with contextlib.suppress(BagError):  # a trial can be read without it
@@ -143,6 +147,7 @@ def read(
     namespace: str | None = None,
     remaps: Mapping[str, str] | None = None,
     progress: Progress | None = None,
+    by_stamp: bool = False,
 ) -> Recording:
     """Return what was recorded of a robot.
 
@@ -162,6 +167,9 @@ def read(
         slash is in the namespace.
     progress : callable or None
         Called now and then with the share that is done, 0 to 1.
+    by_stamp : bool
+        Join what drivers published by leg in the order of its stamps, so that nothing is too late;
+        otherwise in the order in which it was recorded, as the nodes do.
 
     Raises
     ------
@@ -192,7 +200,7 @@ def read(
     legs = {leg for each in streams.values() for leg in each.legs}
     legs |= {leg for each in pieces.values() for _, leg, _, _ in each}
     for kind in KINDS:
-        streams.setdefault(kind.name, _joined(kind, sorted(legs), pieces.get(kind, [])))
+        streams.setdefault(kind.name, _joined(kind, sorted(legs), pieces.get(kind, []), by_stamp))
     return Recording(
         tuple(sorted(legs)),
         {name: each.of_legs(sorted(legs)) for name, each in streams.items()},
@@ -209,12 +217,13 @@ def _pieces(topic: Topic, leg: int, table: Table, ambient: float) -> Iterator[_P
         yield time_ns, leg, stamp_ns, dict(zip(topic.columns, own, strict=True))
 
 
-def _joined(kind: Kind, legs: Sequence[int], pieces: list[_Piece]) -> Stream:
+def _joined(kind: Kind, legs: Sequence[int], pieces: list[_Piece], by_stamp: bool) -> Stream:
     """Return records of all legs, with the log time of the last piece of each."""
     there = {column for _, _, _, values in pieces for column in values}
     needed = [name for name in NEEDED if there & {f'{name}_{axis}' for axis in 'xyz'}]
     joiner, found, time_ns = Joiner(kind, legs, needed), [], 0
-    for time_ns, leg, stamp_ns, values in sorted(pieces, key=operator.itemgetter(0)):
+    order = operator.itemgetter(2 if by_stamp else 0)
+    for time_ns, leg, stamp_ns, values in sorted(pieces, key=order):
         found += [(time_ns, block) for block in joiner.add(leg, stamp_ns, values)]
     found += [(time_ns, block) for block in joiner.expire(math.inf)]
     return Stream.of(kind, tuple(legs), found)
@@ -249,7 +258,10 @@ def _wanted(
     names = [*renamed.items(), *((topic, topic) for topic in bag.topics if topic not in there)]
     robots: dict[str, dict[str, tuple[Topic, int | None]]] = {}
     for full, name in names:
-        space, leg, own = re.fullmatch(_NAME, full).groups()  # type: ignore[union-attr]
+        match = re.fullmatch(_NAME, full)
+        if match is None:  # no slash, or a line break: no name in ROS
+            continue
+        space, leg, own = match.groups()
         topic = _KNOWN.get(f'leg_{{leg}}/{own}' if leg else own)
         if topic is None or not bag.counts[name]:
             continue

@@ -221,9 +221,16 @@ def test_misuse_is_refused(tmp_path):
         writer.write('/other', b'', 0)
     with pytest.raises(InvalidInput, match='-1 ns is not allowed: at least 0 ns'):
         writer.write('/data', b'', -1)
+    with pytest.raises(InvalidInput, match=r"custom_data\['seed'\] = 0 .* text is needed"):
+        writer.describe({'seed': 0})
     writer.describe({'outcome': 'done'})
     writer.close()
     writer.close()
+    for data in ({'x': 1}, {1: 'x'}, ['x']):
+        with pytest.raises(InvalidInput, match=r'custom_data.* is needed'):
+            annotate(tmp_path / 'trial', data)
+        with pytest.raises(InvalidInput, match=r'custom_data.* is needed'):
+            BagWriter(tmp_path / 'other', data)
     assert BagReader(tmp_path / 'trial').custom_data == {'outcome': 'done'}
     for call in (
         lambda: writer.write('/data', b'', 0),
@@ -406,16 +413,19 @@ def test_records_are_those_written_in_their_order(tmp_path, several):
         assert block.rows.tobytes() == written[topic]
 
 
-@pytest.mark.parametrize('kind', ['short', 'big_endian_xml', 'field'])
+@pytest.mark.parametrize('kind', ['short', 'big_endian_xml', 'field', 'text'])
 def test_values_that_cannot_be_read_are_an_error(tmp_path, kind):
     good = serialize_message(WrenchStamped())
-    bad = {'short': good[:-9], 'big_endian_xml': b'\0\2' + good[2:], 'field': good}[kind]
+    bad = {'short': good[:-9], 'big_endian_xml': b'\0\2' + good[2:], 'field': good, 'text': good}[
+        kind
+    ]
     with BagWriter(tmp_path / 'trial') as writer:
         writer.add_topic('/wrench', 'geometry_msgs/msg/WrenchStamped')
         for time_ns, data in enumerate((good, good, bad, bad)):
             writer.write('/wrench', data, time_ns)
-    path = 'wrench.force.w' if kind == 'field' else 'wrench.torque.z'
-    words = 'message on /wrench: ' if kind == 'field' else '/wrench at 2 ns cannot be decoded'
+    path = {'field': 'wrench.force.w', 'text': 'header.frame_id'}.get(kind, 'wrench.torque.z')
+    field = kind in ('field', 'text')
+    words = 'message on /wrench: ' if field else '/wrench at 2 ns cannot be decoded'
     reader = BagReader(tmp_path / 'trial')
     with pytest.raises(BagError, match=words):
         reader.tables({'/wrench': (path,)})

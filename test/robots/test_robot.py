@@ -133,6 +133,7 @@ def test_gaits_by_phase():
         ('[0.0, 0.0, -0.213]\n\ngait', '[0.0, -0.213]\n\ngait', 'a list of 3 numbers'),
         ('axis: [1.0, 0.0, 0.0]', 'axis: [0.0, 0.0, 0.0]', 'no direction'),
         ('kind: trot', 'kind: tripod', '6 or 8 legs'),
+        ('cycle: 0.555', 'cycle: .nan', 'cycle = nan .* 0.05 to 60 s'),
         ('at: [0.0, 0.0, -0.213]', 'at: [0.0, 0.0, -213.0]', r'-213.0 .* -5 to 5 m \(not mm\)'),
         ('foot: [0.0, 0.0, -0.213]', 'foot: [0.0, 0.0, -4.9]', r'leg FL: length = 5\.2.* 5 m'),
         ('mass: 15.02', 'mass: 15020.0', r'mass = 15020.0 .* 2000 kg \(not g\)'),

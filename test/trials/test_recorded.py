@@ -180,6 +180,16 @@ def test_messages_out_of_order_and_without_stamp(tmp_path):
     np.testing.assert_array_equal(trial.force[:, 0, 2], [1.0, 2.0, 3.0])
 
 
+def test_a_leg_that_is_logged_late_has_its_samples(tmp_path):
+    pieces = [(4 * n + 30 * (leg == 2), leg, 4 * n) for n in range(1, 51) for leg in (1, 2)]
+    with Recording(tmp_path / 'bag') as bag:
+        for log, leg, stamp in sorted(pieces):
+            bag.add(f'/leg_{leg}/wrench', wrench(0.0, 0.0, float(stamp)), log * MS, stamp * MS)
+    trial = recorded.load(tmp_path / 'bag')
+    loads = 4.0 * np.arange(1, 51)
+    np.testing.assert_array_equal(trial.force[:, :, 2], np.column_stack([loads, loads]))
+
+
 def test_ambient_pressure_comes_from_the_bag(tmp_path):
     with Recording(tmp_path / 'bag', ambient_pressure=95000.0) as bag:
         bag.add('/leg_1/pressure', FluidPressure(fluid_pressure=105000.0), 10 * MS, 10 * MS)
@@ -221,6 +231,8 @@ def test_bags_that_are_no_trial(tmp_path):
         recorded.load(tmp_path / 'nothing')
     with Recording(tmp_path / 'clock') as bag:
         bag.add('/clock', Clock(), 1)
+        for name in ('wetness', 'leg_1/wetness', '/a\nb/leg_1/wetness'):
+            bag.add(name, Float64(), 1)
         bag.add('/leg_1/wrenches', wrench(0.0, 0.0, 1.0), 1, 1)
         bag.add('/body/pose', pose(0.0, 0.0, 0.0), 1, 1)
     with pytest.raises(BagError, match='no topics of legs'):
