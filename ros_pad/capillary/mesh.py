@@ -19,9 +19,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ros_pad.capillary.crossings import Indices, overlap
-from ros_pad.configuration import integer, number, refuse
+from ros_pad.configuration import integer, number
 from ros_pad.contact.pad import Array
-from ros_pad.errors import MeshError
+from ros_pad.errors import InvalidInput, MeshError
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
 
@@ -182,7 +182,8 @@ class Mesh:
             When the file exists.
         """
         path, meshio = _known(path), _meshio()
-        refuse(path, force=False)
+        if path.exists():
+            raise InvalidInput(f'{path}: the file exists already and is not overwritten')
         options: dict[str, Any] = {
             '.stl': {'binary': True},
             '.msh': {'file_format': 'gmsh', 'binary': False},

@@ -17,8 +17,6 @@ from typing import Any, TypeAlias
 from ros_pad.errors import BagError, ConfigError, InvalidInput, PadError, reason
 from ros_pad.signals import INTERRUPTED
 
-WIDEST = 98  # largest width of tables in columns, also on a wider terminal
-
 UNITS = {
     **{'_n_per_m': 'N/m', '_kg_per_m3': 'kg/m³', '_m2': 'm²', '_m3': 'm³', '_m': 'm'},
     **{'_pa': 'Pa', '_n': 'N', '_deg': '°', '_s': 's'},

@@ -190,6 +190,13 @@ def _shape(measurements: Measurements, pad: Pad, warnings: list[str]) -> tuple[P
     source, free, material = measurements.source, measurements.free, pad.material
     quantity(f'{source}: height', free.height, 'm', above=True)
     quantity(f'{source}: pressure of a free dome', free.pressure, 'Pa', above=True)
+    pressed = measurements.pressed
+    for what, values, unit in (
+        ('pressure of a pressed dome', pressed.pressure, 'Pa'),
+        ('height of a pressed dome', pressed.height, 'm'),
+        ('gap', pressed.gap, 'm'),
+    ):
+        quantity(f'{source}: {what}', values[~np.isnan(values)], unit, above=True)
     name, unit, value = 'stiffness', 'N/m', pad.stiffness
     if material is not None:
         name, unit, value = 'factor', '(factor)', material.factor

@@ -9,6 +9,14 @@ from collections.abc import Iterable, Mapping
 from ros_pad.contact.resistance import FOOT_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
+# Comments of constants that are not fitted, or that follow the pad, as the ceiling does.
+_WORDS = {
+    'shear_stiffness': 'N/m of the whole foot',
+    'chamber_volume': 'm3 of air without the domes',
+    'ceiling': 'Pa gauge',
+    'capillary_force': 'N a dome, of the start foot',
+}
+
 
 def foot_text(
     foot: Foot, description: str, head: Iterable[str], comments: Mapping[str, str]
@@ -73,6 +81,6 @@ def foot_text(
         ]
     lines += ['', f'pads: {foot.pads}']
     for each in FOOT_SETTINGS[1:]:
-        words = f'{each.unit}, {comment(each.name)}'.removeprefix(', ')
+        words = _WORDS.get(each.name) or f'{each.unit}, {comment(each.name)}'.removeprefix(', ')
         lines.append(entry(each.name, getattr(foot, each.name), words))
     return '\n'.join([*lines, f'force_limit: {foot.limit}']) + '\n'

@@ -130,7 +130,7 @@ def test_files_come_back(suffix: str, tmp_path: pathlib.Path):
     assert len(again.points) == len(dome.points)
     assert len(again.faces) == len(dome.faces)
     assert again.volume == pytest.approx(dome.volume, rel=1e-6)
-    with pytest.raises(InvalidInput, match='exists already'):
+    with pytest.raises(InvalidInput, match='exists already and is not overwritten'):
         dome.write(path)
     with pytest.raises(MeshError, match='flip=True'):
         Mesh.read(path, flip=True)
