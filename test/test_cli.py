@@ -225,6 +225,7 @@ def test_a_shape_is_shown_where_no_force_limit_is_known(capsys):
         (['run', 'nothere.yaml'], 'no such file'),
         (['run', 'leg_dry_flat', '--no-ros', '--out', 'empty'], 'exists already'),
         (['contact', '--pressure', '1e3', '--foot', 'nothere'], 'no foot named'),
+        (['contact', '--pressure', '-75e3'], 'pressure = -75000.0'),
         (['calibrate', 'nothere.csv'], 'nothere.csv'),
         (['design', '--load', '7'], '--sole-radius'),
         (['emulate', 'alicat', '--channels', '3'], '--channels'),

@@ -12,6 +12,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, TypeAlias
 
 from ros_pad.errors import BagError, ConfigError, InvalidInput, PadError, reason
@@ -55,8 +56,20 @@ def add_command(
     parser = commands.add_parser(
         name, description=description, epilog=examples, formatter_class=Help
     )
+    parser.register('type', float, partial(_read, float, 'a number in SI units, without a unit,'))
+    parser.register('type', int, partial(_read, int, 'a whole number'))
+    # Without this, -75e3 would be taken for an option (Python 3.14 has the same pattern).
+    parser._negative_number_matcher = re.compile(r'-\.?\d')
     parser.set_defaults(command=run)
     return parser
+
+
+def _read(kind: type[float] | type[int], needed: str, word: str) -> float:
+    """Return an argument as a number, in the form of a ``type`` of argparse."""
+    try:
+        return kind(word)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{word} is not allowed: {needed} is needed') from None
 
 
 def exit_status(run: Callable[[], int], program: str = 'pad') -> int:
