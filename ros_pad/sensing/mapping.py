@@ -385,7 +385,7 @@ def _joints(part: Table, robot: Robot) -> tuple[_Read | None, tuple[str, ...]]:
         found: dict[str, Array | None] = {}
         for kind, field in fields.items():
             values = np.ravel(np.asarray(field(message), dtype=float))
-            if kind != 'positions' and np.isnan(values).all():  # also of none
+            if np.isnan(values).all() and (values.size or kind != 'positions'):
                 found[kind] = None  # drivers leave out, or fill with NaN, what they do not measure
                 continue
             if len(values) < len(given) or (exact and len(values) > len(given)):
