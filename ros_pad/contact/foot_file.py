@@ -9,8 +9,9 @@ from collections.abc import Iterable, Mapping
 from ros_pad.contact.resistance import FOOT_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
-# Comments of constants that are not fitted, or that follow the pad, as the ceiling does.
+# Comments of constants that are not fitted; those that others may have changed name no origin.
 _WORDS = {
+    'sole_radius': 'm',
     'shear_stiffness': 'N/m of the whole foot',
     'chamber_volume': 'm3 of air without the domes',
     'ceiling': 'Pa gauge',

@@ -97,8 +97,8 @@ class PadNode(Node):
     def _publish_parameters(self, changes: Sequence[object] = ()) -> None:
         """Tell recorders the values of all parameters; who comes later hears of them, too."""
         known = self.get_parameters(sorted(self.get_parameters_by_prefix('')))
-        told = {self.get_fully_qualified_name(): {each.name: each.value for each in known}}
-        self._send_parameters(json.dumps(told, default=list))
+        values = {self.get_fully_qualified_name(): {each.name: each.value for each in known}}
+        self._send_parameters(json.dumps(values, default=list))
 
     # --- messages ------------------------------------------------------------------------------
 

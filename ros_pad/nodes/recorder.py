@@ -165,9 +165,9 @@ class RecorderNode(PadNode):
             self.report(self.now_ns(), [self.status('lost messages', self.WARN, text, self.lost)])
         self._save(self._bag.flush)
 
-    def _on_parameters(self, told: tuple[str, dict[str, Any]]) -> None:
+    def _on_parameters(self, given: tuple[str, dict[str, Any]]) -> None:
         """Describe a node in the bag: its first parameters, and later changes."""
-        node, values = told
+        node, values = given
         before = self._newest.get(node)
         self._newest[node] = values
         if before is None:

@@ -2,6 +2,7 @@
 """The page of ``pad explore`` in a headless Chromium, and how it is served."""
 
 import asyncio
+import dataclasses
 import json
 import os
 import shutil
@@ -173,6 +174,13 @@ def test_bad_input_is_marked_where_it_is_and_the_rest_stays(page):
     assert slider_of(page, 'Load on the foot').input_value() == '5.6'
 
 
+def test_a_foot_file_names_no_origin_of_what_was_chosen():
+    foot = dataclasses.replace(Foot.load('large37'), sole_radius=0.02, ceiling=80e3)
+    lines = explore_page.foot_file(foot).splitlines()
+    for name in ('sole_radius', 'ceiling', 'chamber_volume'):
+        assert 'start foot' not in next(line for line in lines if line.startswith(name))
+
+
 def test_the_foot_file_walks(page, tmp_path, capsys):
     typed(page, 'pads', '61')
     typed(page, 'sole_radius', '20')
@@ -216,7 +224,7 @@ def test_other_names_and_pages_are_refused_and_ctrl_c_ends_it():
 
 
 class Shown:
-    """In place of the elements of a page: keeps what they are told."""
+    """In place of the elements of a page: keeps what is set in them."""
 
     def __init__(self):
         self.said = []

@@ -34,12 +34,12 @@ def walked(policy, seed, cycles=12):
     assert loop.robot.verdict is None
     tuning, load = tuning_for(scene), scene.expected_load
     stage = EstimationStage(scene.foot, load, tuning, scene.legs, loop.period_ns)
-    told = loops.estimated(stage, loop.log.records)
-    assert 'axes' not in {doubt.kind(each) for each in np.unique(told.rows['doubt'])}
+    estimates = loops.estimated(stage, loop.log.records)
+    assert 'axes' not in {doubt.kind(each) for each in np.unique(estimates.rows['doubt'])}
     true = np.moveaxis(np.array(rows, dtype=float), 2, 0)
     series = dict(zip(('load', 'speed', 'wet'), true, strict=True))
-    series |= {'alarm': told.rows['slipping'], 'wetness': told.rows['wetness']}
-    series |= {'pressure': loops.pressures(loop.log.records, told.stamps)}
+    series |= {'alarm': estimates.rows['slipping'], 'wetness': estimates.rows['wetness']}
+    series |= {'pressure': loops.pressures(loop.log.records, estimates.stamps)}
     series |= {'standing': loop.log.records.sample.rows['force'][..., 2] > LOAD_GATE * load}
     return {name: each[round(scene.settle / PERIOD) :] for name, each in series.items()}
 

@@ -96,8 +96,8 @@ def test_what_is_unknown_is_refused_by_name():
 
 def test_estimators_can_be_tuned():
     scene = short(3)
-    plain, told = (run(scene, 'flat', tuning=each) for each in (None, tuning_for(scene)))
-    assert np.array_equal(plain.slow['wetness'], told.slow['wetness'])
+    plain, given = (run(scene, 'flat', tuning=each) for each in (None, tuning_for(scene)))
+    assert np.array_equal(plain.slow['wetness'], given.slow['wetness'])
     sure = run(scene, 'flat', tuning=dataclasses.replace(tuning_for(scene), wet_prior=0.9))
     # Before the first step the estimate is the prior.
     assert plain.slow['wetness'][0] == pytest.approx(0.5, abs=0.02)
@@ -183,16 +183,21 @@ def watched(policy, seed, cycles=20):
     x, y, load, grip, wet = np.moveaxis(true, 2, 0)
     tuning, expected = tuning_for(scene), scene.expected_load
     stage = EstimationStage(scene.foot, expected, tuning, scene.legs, loop.period_ns)
-    stamps, told = loops.estimated(stage, loop.log.records)
+    stamps, estimates = loops.estimated(stage, loop.log.records)
     domed = loops.pressures(loop.log.records, stamps) > 1000.0
     stands = loop.log.records.sample.rows['force'][..., 2] > LOAD_GATE * expected
     # Before the robot walks the ground is unobservable.
     walks = (1e-9 * stamps > scene.settle + 0.3)[:, None]
     use = stands & walks & (load > 0.0)
-    quantile = told['margin'][use] + np.hypot(x, y)[use] / load[use]
-    columns = grip[use] / load[use], told['friction'][use], told['friction_sd'][use], quantile
-    last = stands[:-1] & ~stands[1:] & use[:-1] & ~domed[:-1] & (told['doubt'][:-1] == 0.0)
-    ends = np.stack([told['wetness'][:-1][last] > 0.5, wet[:-1][last] > 0.5], axis=1)
+    quantile = estimates['margin'][use] + np.hypot(x, y)[use] / load[use]
+    columns = (
+        grip[use] / load[use],
+        estimates['friction'][use],
+        estimates['friction_sd'][use],
+        quantile,
+    )
+    last = stands[:-1] & ~stands[1:] & use[:-1] & ~domed[:-1] & (estimates['doubt'][:-1] == 0.0)
+    ends = np.stack([estimates['wetness'][:-1][last] > 0.5, wet[:-1][last] > 0.5], axis=1)
     return np.stack([*columns, domed[use]], axis=1), ends
 
 
