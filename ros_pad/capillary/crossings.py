@@ -19,8 +19,8 @@ Indices: TypeAlias = npt.NDArray[np.int64]
 LAYERS, LINES = 128, 256
 """Number of horizontal planes, and of lines in each of them, on which overlaps are looked for.
 
-A body that is flatter than the distance of two planes, as 0.4 % of the height, may lie between them
-unseen; it changes a height of the liquid by less than the methods are off.
+A body that is flatter than the distance of two planes, 0.8 % of the height, may lie between them
+unseen.
 """
 ROUNDING = 1e-4
 """Share of the volume that may be counted twice, as where bodies touch and a file has rounded."""
