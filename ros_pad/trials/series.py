@@ -103,7 +103,9 @@ def trial_of(
     ):
         there |= {name: held(block.stamps, block.rows[name], slow) for name in names}
     codes, places = np.unique(there['doubt'], return_inverse=True)
-    there['doubt'] = np.array([_kind_of(code) for code in codes.tolist()], int)[places]
+    kinds = np.array([_kind_of(code) for code in codes.tolist()], int)
+    # NumPy 1 returns the places of a table as one row.
+    there['doubt'] = kinds[places].reshape(there['doubt'].shape)
     there['slip_speed'] = by_row(math.hypot, there.pop('slip'))
     rows = np.empty((len(slow), len(legs)), SLOW)
     for name, values in there.items():
