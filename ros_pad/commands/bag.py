@@ -26,7 +26,7 @@ from ros_pad.commands.command import FOLDER, Commands, add_command, complain, pr
 from ros_pad.commands.progress import bar
 from ros_pad.errors import BagError, InvalidInput
 from ros_pad.pace import Progress, part
-from ros_pad.trials import label as labels
+from ros_pad.trials import bag_notes
 from ros_pad.trials.recorded import late
 
 _LOSSES = {
@@ -111,18 +111,18 @@ def _content(bag: pathlib.Path, progress: Progress) -> dict[str, Any]:
         'start_ns': reader.start,
         'duration_s': (reader.end - reader.start) * 1e-9,
         'messages': reader.message_count,
-        'recorded_at': reader.custom_data.get(labels.RECORDED_AT),
+        'recorded_at': reader.custom_data.get(bag_notes.RECORDED_AT),
         'topics': {
             name: {'type': kind, 'messages': reader.counts[name]} | _timing(times.get(name))
             for name, kind in reader.topics.items()
         },
-        'lost': custom(labels.LOST),
+        'lost': custom(bag_notes.LOST),
         'late': slow,
         'problem': problem,
         'repair': custom(recovery.KEY),
-        'trial': custom(labels.KEY),
-        'made_with': custom(labels.MADE_WITH),
-        'parameters': custom(labels.PARAMETERS),
+        'trial': custom(bag_notes.KEY),
+        'made_with': custom(bag_notes.MADE_WITH),
+        'parameters': custom(bag_notes.PARAMETERS),
     }
 
 

@@ -219,9 +219,9 @@ def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
         yield Finding('packages', 'problem', f'not usable: {text}', _INSTALL)
         return
     yield Finding('packages', 'ok', ', '.join(names))
-    from ros_pad.trials import label
+    from ros_pad.trials import bag_notes
 
-    made_with = label.made_with()
+    made_with = bag_notes.made_with()
     git = made_with.get('git', 'not a checkout of its repository')
     yield Finding('ros_pad', 'ok', f'{made_with["ros_pad"]}, git: {git}')
 

@@ -32,8 +32,7 @@ from ros_pad.signals import INTERRUPTED, STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.robot import check_reach
 from ros_pad.simulation.scene import Scene, is_bench
-from ros_pad.trials import Metrics, Trial, learnt, loop, others
-from ros_pad.trials import label as labels
+from ros_pad.trials import Metrics, Trial, bag_notes, learnt, loop, other_policies
 from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.trial import fault_lines
 
@@ -107,7 +106,7 @@ def run(options: argparse.Namespace) -> int:
         # Real regulators may wait for set-points: nothing else takes their time.
         with (
             kept_if_filled(folder),
-            others.beside(
+            other_policies.beside(
                 scene, compared, options.seed, level, options.sensing, options.tuning, options.live
             ) as compare,
         ):
@@ -148,7 +147,7 @@ def _answer(
 
 
 def _walk(
-    compare: Callable[[others.Bar], dict[str, Metrics]],
+    compare: Callable[[other_policies.Bar], dict[str, Metrics]],
     folder: pathlib.Path,
     options: argparse.Namespace,
     given: tuple[Scene, str, int, str],
@@ -173,7 +172,7 @@ def _walk(
         {'policy': other, **metrics.as_dict()} for other, metrics in compare(bar).items()
     ]
     if bag is not None:
-        labels.note(bag, trial)
+        bag_notes.note(bag, trial)
     page = _write_report(trial, folder / 'report.html')
     summary = _summary(trial, bag, page)
     (folder / 'summary.json').write_text(json.dumps(summary, indent=1), encoding='utf-8')
@@ -242,7 +241,7 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path | None) 
     return {
         **{name: getattr(trial, name) for name in ('scene', 'policy', 'seed', 'fidelity')},
         'fidelity_bound': None if own.verdict else settings['fidelity_bound'],
-        'fidelity_note': labels.promise(trial),
+        'fidelity_note': bag_notes.promise(trial),
         **{name: settings[name] for name in ('sensing', 'foot')},
         **own.as_dict(),
         # After the metrics, whose faults are those that the controller found.
@@ -269,7 +268,7 @@ def _show(trial: Trial) -> None:
     print(
         f'\n{trial.scene}, seed {trial.seed}, {trial.fidelity}: {own.distance_m:.2f} m in'
         f' {own.cycles:.3g} cycles, {trial.real_time_factor:.1f} times real time\n'
-        f'fidelity: {labels.promise(trial)}\nsensing:  {settings["sensing"]}\n'
+        f'fidelity: {bag_notes.promise(trial)}\nsensing:  {settings["sensing"]}\n'
     )
     rows = [{'policy': trial.policy, **own.as_dict()}, *settings['comparison']]
     for row in rows:

@@ -41,7 +41,7 @@ from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.label import label, note
+from ros_pad.trials.bag_notes import label, note
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.metrics import summarise
 from ros_pad.trials.node_settings import body_settings_for, tuning_for

@@ -25,7 +25,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError, InvalidInput, PadError
 from ros_pad.estimation import tuning
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials import label
+from ros_pad.trials import bag_notes
 
 BACKEND_OPTIONS = 'backend_options'
 """Prefix of the regulator's parameters that are options of its backend."""
@@ -81,7 +81,7 @@ SCENE = Parameter(
 )
 SEED = Parameter('seed', 0, 'Seed of the floor and of the sensor noise.', '', 0, 2**31 - 1)
 EXPECTED_LOAD = Parameter(**vars(tuning.EXPECTED_LOAD))
-AMBIENT_PRESSURE = Parameter(**vars(label.AMBIENT_PRESSURE))
+AMBIENT_PRESSURE = Parameter(**vars(bag_notes.AMBIENT_PRESSURE))
 
 
 def declare(

@@ -24,7 +24,7 @@ from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.intake import Intake
 from ros_pad.nodes.parameters import LEGS, Parameter
 from ros_pad.pace import LATE
-from ros_pad.trials import label
+from ros_pad.trials import bag_notes
 
 PARAMETERS = (
     LEGS,
@@ -56,7 +56,7 @@ class RecorderNode(PadNode):
 
     Messages reach the disk within about a second. Messages that were lost before they arrived are
     counted; the node reports the counts on ``/diagnostics``, and writes them into the bag under
-    `ros_pad.trials.label.LOST`.
+    `ros_pad.trials.bag_notes.LOST`.
 
     Its ROS parameters are in :data:`PARAMETERS`; ``use_sim_time`` is read at the start only.
 
@@ -84,7 +84,7 @@ class RecorderNode(PadNode):
         self._failed = False  # whether writing has failed
         self._told = 0  # lost messages in the last message on /diagnostics
         folder = self.values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
-        about = custom_data or {label.MADE_WITH: json.dumps(label.made_with())}
+        about = custom_data or {bag_notes.MADE_WITH: json.dumps(bag_notes.made_with())}
         self._bag = BagWriter(folder, about)
         self._intake = Intake(self)
         self._topics: dict[str, tuple[Topic, Wire | None]] = {}  # by full name
@@ -145,7 +145,7 @@ class RecorderNode(PadNode):
         """
         self._save(self._intake.take, self._write)
         self._intake.close()
-        self._bag.describe({label.LOST: json.dumps(self.lost)})
+        self._bag.describe({bag_notes.LOST: json.dumps(self.lost)})
         self._bag.close()
 
     def destroy_node(self) -> None:
@@ -172,12 +172,12 @@ class RecorderNode(PadNode):
         self._newest[node] = values
         if before is None:
             self._first[node] = values
-            self.describe({label.PARAMETERS: json.dumps(self._first)})
+            self.describe({bag_notes.PARAMETERS: json.dumps(self._first)})
             return
         at_ns = self._clock_ns if self.simulated else time.time_ns()
         changed = [name for name in values if name not in before or before[name] != values[name]]
         self._changes += [(at_ns, node, name, values[name]) for name in changed]
-        self.describe({label.CHANGES: json.dumps(self._changes)})
+        self.describe({bag_notes.CHANGES: json.dumps(self._changes)})
 
     def _write(self, name: str, data: bytes, at_ns: int) -> None:
         """Write a message that was received at a time, ns."""

@@ -22,7 +22,7 @@ from ros_pad.reports.pictures import POLICY_NAMES
 from ros_pad.reports.style import PAPER_STYLE, Drawn
 from ros_pad.reports.view import View, view_of
 from ros_pad.trials import conditions
-from ros_pad.trials.label import promise
+from ros_pad.trials.bag_notes import promise
 from ros_pad.trials.metrics import stance_ends
 from ros_pad.trials.trial import Trial, fault_lines
 

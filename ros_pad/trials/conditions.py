@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
-from ros_pad.trials.label import AMBIENT_PRESSURE
+from ros_pad.trials.bag_notes import AMBIENT_PRESSURE
 from ros_pad.trials.trial import Trial
 
 
@@ -15,7 +15,7 @@ def rows(trial: Trial) -> list[tuple[str, str]]:
     """Return the conditions of a trial: names and values, as text.
 
     The values of the scene, in SI units, come from ``settings['conditions']``, which
-    `ros_pad.trials.label.described` made when the trial ran.
+    `ros_pad.trials.bag_notes.described` made when the trial ran.
     """
     settings, own = trial.settings, trial.metrics
     recorded = settings.get('conditions') or {}

@@ -37,7 +37,7 @@ from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.sensors import BodySensors, Sensors
 from ros_pad.simulation.terms import with_terms
-from ros_pad.trials.label import settings
+from ros_pad.trials.bag_notes import settings
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.metrics import summarise

@@ -24,8 +24,8 @@ from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES
 from ros_pad.sensing.settings import SETTINGS as BODY_SETTINGS
 from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
-from ros_pad.trials import label
-from ros_pad.trials.label import AMBIENT_PRESSURE, PARAMETERS
+from ros_pad.trials import bag_notes
+from ros_pad.trials.bag_notes import AMBIENT_PRESSURE, PARAMETERS
 
 if TYPE_CHECKING:
     from ros_pad.bags import BagReader
@@ -147,7 +147,7 @@ class NodeSettings:
         ConfigError
             When the foot of the bag is not found.
         """
-        about = label.read(bag)
+        about = bag_notes.read(bag)
         told = about['settings']
         foot, policy = told.get('foot', 'large37'), about['policy'] or 'adaptive'
         try:

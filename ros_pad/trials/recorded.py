@@ -31,7 +31,7 @@ from ros_pad.errors import BagError, InvalidInput
 from ros_pad.joining import Joiner
 from ros_pad.pace import LATE, Progress, part
 from ros_pad.records import KINDS, Kind
-from ros_pad.trials import label
+from ros_pad.trials import bag_notes
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.series import Poses, Records, by_row, trial_of
 from ros_pad.trials.trial import Trial, heading
@@ -96,9 +96,9 @@ def load(
         has another message type than in ros_pad, or when its custom data are not those of ros_pad.
     """
     bag = BagReader(folder, part(progress, 0.0, 0.4))
-    about = label.read(bag)
+    about = bag_notes.read(bag)
     settings = about['settings']
-    settings['lost'] = dict(json.loads(bag.custom_data.get(label.LOST, '{}')))
+    settings['lost'] = dict(json.loads(bag.custom_data.get(bag_notes.LOST, '{}')))
     settings['repaired'] = REPAIR in bag.custom_data
     if bag.problem:
         settings['problem'] = bag.problem

@@ -27,8 +27,8 @@ from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.pace import TICK_PERIOD_NS, Pace, Progress, part
 from ros_pad.pipeline import Pipeline
 from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind
+from ros_pad.trials.bag_notes import CHANGES
 from ros_pad.trials.comparison import Comparison, Stream, Track, compare
-from ros_pad.trials.label import CHANGES
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import Recording, read
 from ros_pad.trials.replay_body import compare_body

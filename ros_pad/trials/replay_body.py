@@ -21,8 +21,8 @@ from ros_pad.sensing import BodyEstimate, SensingStage
 from ros_pad.sensing import Mapping as Meaning
 from ros_pad.sensing.settings import SETTINGS
 from ros_pad.sensing.stage import estimator_of, robot_of, sample_of
+from ros_pad.trials.bag_notes import PARAMETERS
 from ros_pad.trials.comparison import Comparison, Stream, compare
-from ros_pad.trials.label import PARAMETERS
 
 OF_BODY = -1
 """In place of the number of a leg, for the pose of the body."""

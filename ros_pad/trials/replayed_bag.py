@@ -9,7 +9,7 @@ import os
 from ros_pad.bags import BagWriter
 from ros_pad.bags.wire import TYPE, Wire
 from ros_pad.records import Block
-from ros_pad.trials.label import KEY
+from ros_pad.trials.bag_notes import KEY
 from ros_pad.trials.replay import Replay
 
 

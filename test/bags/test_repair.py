@@ -26,7 +26,7 @@ from std_msgs.msg import Float64, String
 from ros_pad.bags import BagReader, BagWriter, recovery
 from ros_pad.cli import main
 from ros_pad.errors import BagError
-from ros_pad.trials.label import RECORDED_AT
+from ros_pad.trials.bag_notes import RECORDED_AT
 
 
 def data_in(folder: pathlib.Path, topic: str) -> list[float]:

@@ -28,7 +28,7 @@ from ros_pad.nodes import qos
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.records import ESTIMATE, SAMPLE, Block
-from ros_pad.trials import label
+from ros_pad.trials import bag_notes
 
 KEPT = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 QUIET = {'start_parameter_services': False, 'enable_rosout': False}
@@ -101,8 +101,8 @@ def test_everything_that_a_robot_has_once_is_recorded(robot, record, until, tmp_
         f'/{topic.name().lstrip("/")}': topic.type_name for topic in topics.RECORDED
     }
     assert reader.custom_data['outcome'] == 'done'
-    assert json.loads(reader.custom_data[label.LOST]) == {}
-    assert json.loads(reader.custom_data[label.MADE_WITH])['ros_pad'] == ros_pad.__version__
+    assert json.loads(reader.custom_data[bag_notes.LOST]) == {}
+    assert json.loads(reader.custom_data[bag_notes.MADE_WITH])['ros_pad'] == ros_pad.__version__
 
 
 @pytest.mark.parametrize('simulated', [False, True])
@@ -191,10 +191,10 @@ def test_the_parameters_of_the_nodes_and_their_changes_are_in_the_bag(
         return node
 
     def changes():
-        return custom_data(tmp_path / 'trial', label.CHANGES) or []
+        return custom_data(tmp_path / 'trial', bag_notes.CHANGES) or []
 
     before, node, recorder = time.time_ns(), controller(1.3), record()
-    until(lambda: '/controller' in (custom_data(tmp_path / 'trial', label.PARAMETERS) or {}))
+    until(lambda: '/controller' in (custom_data(tmp_path / 'trial', bag_notes.PARAMETERS) or {}))
     nonsense = qos.publisher(robot, topics.PARAMETERS)
     until(nonsense.get_subscription_count)
     for text in ('no JSON', '[1]', '{"/controller": 3}'):
@@ -210,7 +210,7 @@ def test_the_parameters_of_the_nodes_and_their_changes_are_in_the_bag(
     times, *rest = zip(*changes(), strict=True)
     assert rest == [('/controller',) * 2, ('margin',) * 2, (1.5, 1.7)]
     assert before <= times[0] <= times[1] <= time.time_ns()
-    parameters = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])
+    parameters = json.loads(BagReader(tmp_path / 'trial').custom_data[bag_notes.PARAMETERS])
     assert set(parameters) == {'/controller', '/recorder'}
     assert parameters['/controller']['margin'] == 1.3
     assert parameters['/controller']['legs'] == list(SIX)
@@ -247,7 +247,7 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
         process.kill()
     assert process.returncode == 0, errors
     reader = BagReader(tmp_path / 'trial')
-    (lost,) = json.loads(reader.custom_data[label.LOST]).items()
+    (lost,) = json.loads(reader.custom_data[bag_notes.LOST]).items()
     assert lost[0] == '/body/pose'
     assert lost[1] > 1000
     # Messages sent before discovery or while the recorder ends are not counted as lost.

@@ -21,8 +21,8 @@ from ros_pad.records import COMMAND, ESTIMATE, Block, Field, Kind
 from ros_pad.records import SAMPLE as SAMPLES
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
+from ros_pad.trials.bag_notes import CHANGES, PARAMETERS
 from ros_pad.trials.comparison import Stream, compare
-from ros_pad.trials.label import CHANGES, PARAMETERS
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay import replay
 

@@ -11,7 +11,7 @@ import pytest
 from ros_pad import workers
 from ros_pad.estimation.scales import Scale
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials import loop, others
+from ros_pad.trials import loop, other_policies
 from ros_pad.trials.node_settings import tuning_for
 
 SCENE = dataclasses.replace(Scene.load('hexapod_patches'), cycles=2)
@@ -34,7 +34,7 @@ def shown():
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
-    monkeypatch.setattr(others, 'SHORTEST', 0.0)
+    monkeypatch.setattr(other_policies, 'SHORTEST', 0.0)
 
 
 def expected(tuning=None):
@@ -47,7 +47,7 @@ def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, 
     tuning = tuning_for(SCENE, 'markers')
     tuning = dataclasses.replace(tuning, scales={'flat_wet': Scale(3.0, 0.01)})
     monkeypatch.setattr(workers, 'cores', lambda: cores)
-    with others.beside(SCENE, POLICIES, 1, 'L1', 'markers', tuning) as metrics:
+    with other_policies.beside(SCENE, POLICIES, 1, 'L1', 'markers', tuning) as metrics:
         found = metrics(shown)
     assert found == expected(tuning)
     assert found['flat'].wet_accuracy > loop.run(SCENE, 'flat', 1, 'L1').metrics.wet_accuracy
@@ -67,7 +67,7 @@ def test_a_process_that_is_killed_costs_no_result(monkeypatch, shown):
             yield executor
 
     monkeypatch.setattr(workers, 'pool', watched)
-    with others.beside(SCENE, POLICIES, 1, 'L1', 'markers', None) as metrics:
+    with other_policies.beside(SCENE, POLICIES, 1, 'L1', 'markers', None) as metrics:
         for pid in list(opened[0]._processes):
             os.kill(pid, signal.SIGKILL)
         assert metrics(shown) == expected()
