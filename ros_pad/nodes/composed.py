@@ -328,7 +328,6 @@ def run(
         scene = Scene.load(scene)
     policy = policy or scene.policy
     level = levels.level(scene, fidelity, policy, sensing == 'joints')
-    describe = partial(label, scene, policy, seed, level, sensing=sensing)
     context = rclpy.Context()
     try:
         # rclpy's own signal handlers would stop the nodes before the pads are vented.
@@ -344,7 +343,6 @@ def run(
                 with STOP.during(partial(setattr, trial, 'stopped', True)):
                     trial.walk(progress)
                 wall = time.perf_counter() - started
-                trial.recorder.describe(describe(interrupted=trial.stopped))
             except BaseException:
                 with suppress(PadError):  # a bag on a full disk cannot be closed either
                     trial.close()
@@ -354,6 +352,7 @@ def run(
         context.try_shutdown()
     robot, floor = trial.simulator.robot, trial.simulator.floor
     controller, shared = trial.walked, trial.estimator.stage.model.shared
+    stopped = trial.stopped
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()
@@ -361,6 +360,6 @@ def run(
     result.floor = floor
     result.metrics = summarise(scene, result, robot, controller)
     result.real_time_factor = robot.time / wall
-    result.settings['learnt'] = settings_of(shared)
+    result.settings |= {'learnt': settings_of(shared), 'interrupted': stopped}
     note(bag, result)
     return result

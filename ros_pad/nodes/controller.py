@@ -17,7 +17,7 @@ from ros_pad.nodes.base import PadNode
 from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, SEED, Parameter
 from ros_pad.records import Block
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.node_settings import NodeSettings
+from ros_pad.trials.node_settings import FIXED_PRESSURE, NodeSettings
 
 PARAMETERS = (
     LEGS,
@@ -25,11 +25,7 @@ PARAMETERS = (
     EXPECTED_LOAD,
     Parameter('policy', 'adaptive', 'Policy that decides the morphology.', choices=POLICIES),
     *(Parameter(**vars(setting), live=True) for setting in (*POLICY_SETTINGS, MARGIN)),
-    Parameter(
-        'dome_pressure', 0.0,
-        'Gauge pressure of every dome, at least 1000 Pa; 0: it is chosen from the load.',
-        'Pa', 0.0, 1e6,
-    ),
+    Parameter(**vars(FIXED_PRESSURE)),
     Parameter(**vars(LIFT_OFF)),
     Parameter(**vars(COMMAND_TIMEOUT), live=True),
     Parameter(

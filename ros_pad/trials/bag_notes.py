@@ -50,12 +50,7 @@ AMBIENT_PRESSURE = Setting(
 
 
 def label(
-    scene: Scene,
-    policy: str,
-    seed: int,
-    fidelity: str,
-    sensing: str = 'markers',
-    interrupted: bool = False,
+    scene: Scene, policy: str, seed: int, fidelity: str, sensing: str = 'markers'
 ) -> dict[str, str]:
     """Return the custom data of a trial's bag, which :func:`note` completes: texts by key.
 
@@ -63,8 +58,6 @@ def label(
     ----------
     scene, policy, seed, fidelity, sensing
         The conditions of the trial; ``sensing`` is ``markers`` or ``joints``.
-    interrupted : bool
-        Whether the trial was stopped before its end.
     """
     known = {
         'scene': scene.source,
@@ -73,17 +66,21 @@ def label(
         'fidelity': fidelity,
         'floor': asdict(scene.floor),
         'ambient_pressure': AMBIENT_PRESSURE.default,
-        'settings': settings(scene, policy, fidelity, sensing) | {'interrupted': interrupted},
+        'settings': settings(scene, policy, fidelity, sensing),
     }
     return {KEY: json.dumps(known), MADE_WITH: json.dumps(made_with())}
 
 
 def note(folder: str | os.PathLike[str], trial: Trial) -> None:
-    """Add the results of a trial, and the metrics of other policies, to its closed bag."""
+    """Add the results of a trial, and the metrics of other policies, to its closed bag.
+
+    ``interrupted`` says whether the trial was stopped before its end.
+    """
     known = json.loads(BagReader(folder).custom_data[KEY])
     known['metrics'] = trial.metrics.as_dict() if trial.metrics else None
     known['real_time_factor'] = trial.real_time_factor
-    known['settings']['comparison'] = trial.settings['comparison']
+    for name in ('comparison', 'interrupted'):
+        known['settings'][name] = trial.settings[name]
     annotate(folder, {KEY: json.dumps(known)})
 
 

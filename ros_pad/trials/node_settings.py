@@ -30,16 +30,17 @@ from ros_pad.trials.bag_notes import AMBIENT_PRESSURE, PARAMETERS
 if TYPE_CHECKING:
     from ros_pad.bags import BagReader
 
+FIXED_PRESSURE = Setting(
+    'dome_pressure', 0.0,
+    'Gauge pressure of every dome, at least 1000 Pa; 0: it is chosen from the load.',
+    'Pa', 0.0, 1e6,
+)  # fmt: skip
+
 KNOWN = {
     each.name: each
     for each in (
-        EXPECTED_LOAD,
-        Setting(
-            'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
-            'Pa', 0.0, 1e6,
-        ),
-        MARGIN, LIFT_OFF, COMMAND_TIMEOUT, AMBIENT_PRESSURE, PUBLISH_RATE, *SETTINGS,
-        *POLICY_SETTINGS,
+        EXPECTED_LOAD, FIXED_PRESSURE, MARGIN, LIFT_OFF, COMMAND_TIMEOUT, AMBIENT_PRESSURE,
+        PUBLISH_RATE, *SETTINGS, *POLICY_SETTINGS,
     )
 }  # fmt: skip
 """Parameters of estimator and controller that a replay can change, by name."""

@@ -129,13 +129,18 @@ def _poses(recording: Recording, topic: Topic) -> Poses | None:
     """Return what was recorded of x and y, m, and heading, rad; None if nothing was."""
     if topic not in recording.poses:
         return None
-    stamps, _, values = _stamped(*recording.poses[topic])
+    stamps, _, values = stamped(*recording.poses[topic])
     return stamps, np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
 
 
-def _stamped(times: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def stamps_of(table: np.ndarray) -> np.ndarray:
+    """Return the stamps, ns, with which the rows of a table begin."""
+    return table[:, :2].astype(np.int64) @ np.array([10**9, 1])
+
+
+def stamped(times: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return stamps, log times, ns, and values of a table that begins with stamps, in order."""
-    stamps = table[:, :2].astype(np.int64) @ np.array([10**9, 1])
+    stamps = stamps_of(table)
     stamps = np.where(stamps == 0, times, stamps)  # a driver may leave the stamp empty
     order = np.argsort(stamps, kind='stable')
     return stamps[order], np.sort(times), table[order, 2:]
@@ -211,7 +216,7 @@ def read(
 
 def _pieces(topic: Topic, leg: int, table: Table, ambient: float) -> Iterator[_Piece]:
     """Yield log time, ns, leg, stamp, ns, and numbers by column of the messages of a leg."""
-    stamps, times, values = _stamped(*table) if topic.frame else (table[0], *table)
+    stamps, times, values = stamped(*table) if topic.frame else (table[0], *table)
     numbers = to_record(topic, values, ambient).tolist()
     for time_ns, stamp_ns, own in zip(times.tolist(), stamps.tolist(), numbers, strict=True):
         yield time_ns, leg, stamp_ns, dict(zip(topic.columns, own, strict=True))

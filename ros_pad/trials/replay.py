@@ -204,7 +204,7 @@ def replay(
         )
     ]
     # The body estimator is replayed beside the feet, which take what it published.
-    of_body, note = compare_body(bag, recording.topics.get(SAMPLE.name, ''))
+    of_body, note = compare_body(bag, recording)
     recorded, replayed = (
         {key: track for kind in made for key, track in streams[kind].tracks().items()}
         for streams in (inputs.streams, made)

@@ -23,6 +23,7 @@ from ros_pad.sensing.settings import SETTINGS
 from ros_pad.sensing.stage import estimator_of, robot_of, sample_of
 from ros_pad.trials.bag_notes import PARAMETERS
 from ros_pad.trials.comparison import Comparison, Stream, compare
+from ros_pad.trials.recorded import Recording, stamped, stamps_of
 
 OF_BODY = -1
 """In place of the number of a leg, for the pose of the body."""
@@ -34,15 +35,15 @@ _POSE = Kind(
 )
 
 
-def compare_body(bag: BagReader, sample: str) -> tuple[list[Comparison], str]:
+def compare_body(bag: BagReader, recording: Recording) -> tuple[list[Comparison], str]:
     """Replay the body estimator with its recorded parameters, and compare what it published.
 
     Parameters
     ----------
     bag : BagReader
         What was recorded.
-    sample : str
-        Topic of the samples of the feet; empty if there is none.
+    recording : Recording
+        What it has of the robot.
 
     Returns
     -------
@@ -56,32 +57,26 @@ def compare_body(bag: BagReader, sample: str) -> tuple[list[Comparison], str]:
     """
     names, nodes = {each.name for each in SETTINGS}, bag.custom_data.get(PARAMETERS, '{}')
     found = [each for each in json.loads(nodes).values() if each.keys() >= names]
+    sample = recording.topics.get(SAMPLES.name, '')
     prefix = sample.removesuffix(SAMPLE.name())
     inputs = [prefix + each.name() for each in (FORCE, IMU, JOINT_STATES)]
-    odom = prefix + ODOM.name()
-    if len(found) != 1 or not sample or not all(map(bag.counts.get, (*inputs, odom))):
+    complete = sample and ODOM in recording.poses and all(map(bag.counts.get, inputs))
+    if len(found) != 1 or not complete:
         return [], ''
     try:
         made_poses, made_feet = _play(bag, found[0], *inputs)
     except (ConfigError, InvalidInput, KeyError) as error:
         return [], f'the body estimator is not replayed: {reason(error)}'
     gap_ns = math.inf if bag.counts.get('/clock') else -math.inf
-    records, tables = bag.read({sample: SAMPLES}, {odom: (*STAMP, *ODOM.values)})
-    feet = Stream(SAMPLES, *records[sample])
+    feet = recording.streams[SAMPLES.name]
     # At moments without an estimate, the node sends records without values.
     feet = feet.where(np.isfinite(feet.block.rows['force']).any(axis=(1, 2)))
-    times, table = tables[odom]
-    block = Block(_stamps(table), table[:, 2:].copy().view(_POSE.dtype))
-    poses = Stream(_POSE, (OF_BODY,), times, block)
+    stamps, times, values = stamped(*recording.poses[ODOM])
+    poses = Stream(_POSE, (OF_BODY,), times, Block(stamps, values.copy().view(_POSE.dtype)))
     return [
-        *compare(odom, poses, made_poses, bag.start, gap_ns),
+        *compare(prefix + ODOM.name(), poses, made_poses, bag.start, gap_ns),
         *compare(sample, feet, made_feet, bag.start, gap_ns),
     ], ''
-
-
-def _stamps(table: np.ndarray) -> np.ndarray:
-    """Return the stamps, ns, with which the rows of a table begin."""
-    return table[:, :2].astype(np.int64) @ np.array([10**9, 1])
 
 
 def _play(
@@ -128,7 +123,7 @@ def _messages(bag: BagReader, force: str, imu: str, joints: str) -> Iterator[tup
     imu_times, table = tables[imu]
     found: list[tuple[int, int, str, Any]] = [
         *zip(times, block.stamps, repeat(force), block.rows['force'], strict=False),
-        *zip(imu_times, _stamps(table), repeat(imu), table[:, 2:].tolist(), strict=False),
+        *zip(imu_times, stamps_of(table), repeat(imu), table[:, 2:].tolist(), strict=False),
     ]
     for _, message, log_ns in bag.messages({joints}):
         stamp = message.header.stamp
