@@ -110,9 +110,33 @@ class ComposedTrial:
         self._context = context
         self.executor = EventsExecutor(context=context)
         self._nodes: list[Node] = []
+        foot, tuning = scene.foot.source, tuning or tuning_for(scene, sensing)
+        ground = {'scene': scene.source, 'seed': seed}
+        timed = {'use_sim_time': True, 'legs': list(scene.legs)}
+        loaded = timed | {'foot': foot, 'expected_load': scene.expected_load}
         try:
-            tuning = tuning or tuning_for(scene, sensing)
-            self._add_nodes(policy, seed, bag, fidelity, sensing, tuning)
+            # The recorder is the first node; the last one, the simulator, starts the trial.
+            about = label(scene, policy, seed, fidelity, sensing)
+            self.recorder = self._add(partial(RecorderNode, about), folder=os.fspath(bag), **timed)
+            # The node gets the options of the scene, not its name, because the scene in memory may
+            # differ from its file.
+            options = scene.regulator_options.items()
+            own = {f'{BACKEND_OPTIONS}.{key}': value for key, value in options}
+            own['ceiling'] = scene.foot.ceiling
+            self.regulator = self._add(RegulatorNode, foot=foot, **timed, **own)
+            self.body_estimator = None
+            if sensing == 'joints':
+                assert isinstance(scene.body, LeggedBody)
+                # The soles of simulated robots are on ankles.
+                own = {'robot': scene.body.robot.source, 'foot_radius': 0.0}
+                own |= body_settings_for(scene)
+                self.body_estimator = self._add(BodyEstimatorNode, **timed, **own)
+            self.estimator = self._add(EstimatorNode, **tuning.values, **loaded)
+            own = {'policy': policy, 'dome_pressure': scene.dome_pressure or 0.0}
+            own |= ground if policy == 'oracle' else {}
+            self.controller = self._add(ControllerNode, **own, **loaded)
+            own = {'fidelity': fidelity, 'sensing': sensing, 'publish_clock': True, 'foot': foot}
+            self.simulator = self._add(partial(SimulatorNode, False), **own, **ground)
             # The executor adds nodes only while it spins; messages that were published before
             # that would arrive in another order.
             self.executor.spin_once(timeout_sec=0.01)
@@ -133,42 +157,6 @@ class ComposedTrial:
         self._nodes.append(node)
         self.executor.add_node(node)
         return node
-
-    def _add_nodes(
-        self,
-        policy: str,
-        seed: int,
-        bag: str | os.PathLike[str],
-        fidelity: str,
-        sensing: str,
-        tuning: Tuning,
-    ) -> None:
-        """Make the nodes: the recorder first; last the simulator, which starts the trial."""
-        scene, foot = self.scene, self.scene.foot.source
-        ground = {'scene': scene.source, 'seed': seed}
-        timed = {'use_sim_time': True, 'legs': list(scene.legs)}
-        loaded = timed | {'foot': foot, 'expected_load': scene.expected_load}
-        about = label(scene, policy, seed, fidelity, sensing=sensing)
-        self.recorder = self._add(partial(RecorderNode, about), folder=os.fspath(bag), **timed)
-        # The node gets the options of the scene, not its name, because the scene in memory may
-        # differ from its file.
-        options = scene.regulator_options.items()
-        own = {f'{BACKEND_OPTIONS}.{key}': value for key, value in options}
-        own['ceiling'] = scene.foot.ceiling
-        self.regulator = self._add(RegulatorNode, foot=foot, **timed, **own)
-        self.body_estimator = None
-        if sensing == 'joints':
-            assert isinstance(scene.body, LeggedBody)
-            # The soles of simulated robots are on ankles.
-            own = {'robot': scene.body.robot.source, 'foot_radius': 0.0}
-            own |= body_settings_for(scene)
-            self.body_estimator = self._add(BodyEstimatorNode, **timed, **own)
-        self.estimator = self._add(EstimatorNode, **tuning.values, **loaded)
-        own = {'policy': policy, 'dome_pressure': scene.dome_pressure or 0.0}
-        own |= ground if policy == 'oracle' else {}
-        self.controller = self._add(ControllerNode, **own, **loaded)
-        own = {'fidelity': fidelity, 'sensing': sensing, 'publish_clock': True, 'foot': foot}
-        self.simulator = self._add(partial(SimulatorNode, False), **own, **ground)
 
     def _discover(self) -> None:
         deadline = time.monotonic() + PATIENCE

@@ -28,6 +28,9 @@ _Point = type(_MARKER.pose.position)
 FORCE_SCALE = 0.01
 """Length of an arrow for one newton, m."""
 
+MARKERS_PERIOD_NS = 100_000_000
+"""Time between two messages of markers, ns."""
+
 CELL = 0.05
 """Edge of a square of floor that is drawn wet or dry, m."""
 

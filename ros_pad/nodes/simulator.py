@@ -16,7 +16,7 @@ from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError, InvalidInput, LimitError
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes.base import PadNode
-from ros_pad.nodes.markers import WalkMarkers
+from ros_pad.nodes.markers import MARKERS_PERIOD_NS, WalkMarkers
 from ros_pad.nodes.parameters import SCENE, SEED, Parameter
 from ros_pad.nodes.qos import publisher
 from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, RealTime
@@ -50,9 +50,6 @@ PARAMETERS = (
 
 HIGHEST = 1e6
 """Highest gauge pressure that is accepted, Pa: no regulator's ceiling may exceed it."""
-
-MARKERS_PERIOD_NS = 100_000_000
-"""Time between two messages with markers for RViz and Foxglove, ns."""
 
 _LATEST_NS = 50_000_000  # difference of stamps from the clock up to which they stay even
 

@@ -20,7 +20,7 @@ from ros_pad.bags.topics import Topic
 from ros_pad.control.policies import DOME, FLAT
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes.base import PadNode
-from ros_pad.nodes.markers import array_of, marker_of_foot
+from ros_pad.nodes.markers import MARKERS_PERIOD_NS, array_of, marker_of_foot
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, chosen
 from ros_pad.nodes.qos import publisher
 from ros_pad.pace import Pace
@@ -42,9 +42,6 @@ PARAMETERS = (
         'frame', 'world', 'Frame of the positions of the feet: world, or odom without markers.'
     ),
 )
-
-MARKERS_PERIOD_NS = 100_000_000
-"""Time between two messages of markers, ns."""
 
 Show = Callable[[int, Any], None]
 """Publishes a row of a record with its stamp, ns."""
