@@ -27,6 +27,7 @@ from ros_pad.nodes.composed import ComposedTrial
 from ros_pad.records import KINDS, SAMPLE
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
+from ros_pad.trials import recorded
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay import replay
 from ros_pad.trials.trial import SLOW
@@ -334,6 +335,7 @@ def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
         scene_of('hexapod_patches', 30), 'dome', bag=tmp_path / 'bag', progress=once
     )
     assert trial.settings['interrupted']
+    assert recorded.load(tmp_path / 'bag').settings['interrupted']
     assert 2.5 < trial.metrics.duration_s < 2.8
     assert signal.getsignal(signal.SIGTERM) is before
     check_vented(tmp_path / 'bag')
