@@ -235,8 +235,7 @@ class Emulator:
         except OSError as error:
             self._unplug()
             raise TransportError(
-                f'link = {self._link!r}: the device cannot be plugged in: {error.strerror}',
-                self._link,
+                f'link = {self._link!r}: the device cannot be plugged in: {error.strerror}'
             ) from error
 
     def _unplug(self) -> None:
