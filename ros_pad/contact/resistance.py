@@ -22,7 +22,7 @@ import math
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +36,9 @@ from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, check_criterion,
 from ros_pad.contact.material import Material, factor_in
 from ros_pad.contact.pad import MeasuredLimit, Pad, broadcast, plain
 from ros_pad.errors import ConfigError, InvalidInput, NoEquilibrium
+
+if TYPE_CHECKING:
+    from ros_pad.contact.film import Film
 
 THICK_FILM = 1.0e-3
 """Thickness of a liquid film that does not drain under a flat sole within a stance, m."""
@@ -328,6 +331,28 @@ class Foot:
             Thickness of the film under the domes and under the flat sole, m, from 0 (dry).
         """
         return laws.resistance(self, dome_load, sole_load, pressure, dome_film, sole_film)
+
+    def grip(
+        self, load: float, pressure: float, film: Film | None = None, duration: float = 0.0
+    ) -> float:
+        """Return the tangential resistance, N; for speed the input is not checked.
+
+        Parameters
+        ----------
+        load : float
+            Normal force on the foot, N, from 0.
+        pressure : float
+            Gauge pressure, Pa, from 0.
+        film : Film, optional
+            Film on which the foot stands; by default the ground is dry.
+        duration : float
+            Time for which the film drains before, s, from 0.
+        """
+        on_domes = self.dome_load(load, pressure)
+        on_sole, films = load - on_domes, (0.0, 0.0)
+        if film is not None:
+            films = film.drain(on_domes, on_sole, pressure, duration)
+        return self.resistance_of(on_domes, on_sole, pressure, *films)
 
 
 @functools.lru_cache(maxsize=64)
