@@ -159,19 +159,9 @@ class Film:
         Returns
         -------
         tuple of float
-            :attr:`under_domes` and :attr:`under_sole`, m.
+            Thickness of the film under domes and flat sole, m.
         """
         self._state = drained(
             self, self._fresh, self._state, dome_load, sole_load, pressure, duration
         )
         return self._state[1] ** -0.5, self._state[2] ** -0.5
-
-    @property
-    def under_domes(self) -> float:
-        """Film thickness under the domes, m."""
-        return self._state[1] ** -0.5
-
-    @property
-    def under_sole(self) -> float:
-        """Film thickness under the flat part of the sole, m."""
-        return self._state[2] ** -0.5

@@ -84,18 +84,18 @@ def slip_force(foot: Foot, setup: Any, load: float, pressure: float, wet: bool) 
         return dry
     film = Film(foot, setup.viscosity)
     film.touch_down(setup.film_thickness)
-    film.drain(domes, sole, pressure, setup.dwell)
+    films = film.drain(domes, sole, pressure, setup.dwell)
     step = dry / _STEPS
     pull, last = 0.0, 0.0
     while True:
-        held = foot.resistance_of(domes, sole, pressure, film.under_domes, film.under_sole)
+        held = foot.resistance_of(domes, sole, pressure, *films)
         if pull >= held:
             # Interpolate linearly between two steps.
             back = (pull - held) / (pull - held + last) if pull else 0.0
             return pull - back * step
         last = held - pull
         pull += step
-        film.drain(domes, sole, pressure, step / (foot.shear_stiffness * setup.speed))
+        films = film.drain(domes, sole, pressure, step / (foot.shear_stiffness * setup.speed))
 
 
 def compute(scene: BenchScene) -> BenchTrial:

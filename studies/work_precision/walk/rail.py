@@ -75,8 +75,8 @@ def cap_in_stance(case: Walk) -> Callable[[float], float]:
     film = Film(foot, scene.floor.viscosity)
     film.touch_down(scene.floor.film_thickness)
     fresh = scene.floor.film_thickness**-2
-    film.drain(domes, sole, case.pressure, 1.0)
-    dome_rate, sole_rate = film.under_domes**-2 - fresh, film.under_sole**-2 - fresh
+    drained = film.drain(domes, sole, case.pressure, 1.0)
+    dome_rate, sole_rate = (thickness**-2 - fresh for thickness in drained)
 
     def cap(since: float) -> float:
         films = (fresh + dome_rate * since) ** -0.5, (fresh + sole_rate * since) ** -0.5
