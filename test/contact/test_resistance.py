@@ -76,7 +76,7 @@ def test_domes_past_their_limit():
 @pytest.mark.parametrize('pressure', [71.1e3, 75.3e3, 89.9e3])
 def test_domes_between_tabulated_limits(pressure):
     limit = 20 * force_limit(LARGE_PAD, pressure)
-    assert bare_foot(limit='thickness').dome_load(1e3, pressure) == pytest.approx(limit, rel=1e-5)
+    assert bare_foot(limit='thickness').dome_load(1e3, pressure) == pytest.approx(limit, rel=5e-5)
 
 
 def test_film_leaves_a_share_of_dry_contact():
