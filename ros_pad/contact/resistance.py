@@ -309,29 +309,6 @@ class Foot:
         """
         return laws.dome_load(self, load, pressure)
 
-    def resistance_of(
-        self,
-        dome_load: float,
-        sole_load: float,
-        pressure: float,
-        dome_film: float,
-        sole_film: float,
-    ) -> float:
-        """Return the tangential resistance, N, for given loads of domes and flat sole.
-
-        For speed the input is not checked; scalars only.
-
-        Parameters
-        ----------
-        dome_load, sole_load : float
-            Normal force on the domes and on the flat sole, N, from 0.
-        pressure : float
-            Gauge pressure, Pa, from 0.
-        dome_film, sole_film : float
-            Thickness of the film under the domes and under the flat sole, m, from 0 (dry).
-        """
-        return laws.resistance(self, dome_load, sole_load, pressure, dome_film, sole_film)
-
     def grip(
         self, load: float, pressure: float, film: Film | None = None, duration: float = 0.0
     ) -> float:
@@ -352,7 +329,7 @@ class Foot:
         on_sole, films = load - on_domes, (0.0, 0.0)
         if film is not None:
             films = film.drain(on_domes, on_sole, pressure, duration)
-        return self.resistance_of(on_domes, on_sole, pressure, *films)
+        return laws.resistance(self, on_domes, on_sole, pressure, *films)
 
 
 @functools.lru_cache(maxsize=64)
@@ -438,7 +415,8 @@ def tangential_resistance(
 
     def one(load: float, pressure: float, dome_film: float, sole_film: float) -> float:
         on_domes = foot.dome_load(load, pressure)
-        return foot.resistance_of(on_domes, load - on_domes, pressure, dome_film, sole_film)
+        films = dome_film, sole_film
+        return laws.resistance(foot, on_domes, load - on_domes, pressure, *films)
 
     return plain(np.vectorize(one, otypes=[float])(*values))
 

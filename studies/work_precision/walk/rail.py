@@ -11,6 +11,7 @@ from typing import Any
 
 from scipy.integrate import solve_ivp
 
+from ros_pad.contact import laws
 from ros_pad.contact.film import Film
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import RailBody, RailGait, Scene
@@ -69,7 +70,7 @@ def cap_in_stance(case: Walk) -> Callable[[float], float]:
     domes = foot.dome_load(scene.body.load, case.pressure)
     sole = scene.body.load - domes
     if scene.floor.kind == 'dry':
-        dry = foot.resistance_of(domes, sole, case.pressure, 0.0, 0.0)
+        dry = laws.resistance(foot, domes, sole, case.pressure, 0.0, 0.0)
         return lambda _: dry
     # 1/h² of a film thickness h grows at a constant rate.
     film = Film(foot, scene.floor.viscosity)
@@ -80,7 +81,7 @@ def cap_in_stance(case: Walk) -> Callable[[float], float]:
 
     def cap(since: float) -> float:
         films = (fresh + dome_rate * since) ** -0.5, (fresh + sole_rate * since) ** -0.5
-        return foot.resistance_of(domes, sole, case.pressure, *films)
+        return laws.resistance(foot, domes, sole, case.pressure, *films)
 
     return cap
 
