@@ -62,21 +62,8 @@ class MeshError(PadError):
 class DeviceError(PadError):
     """Communication with a device failed, or the device reports a fault.
 
-    Attributes
-    ----------
-    port : str
-        Port, such as ``/dev/ttyUSB0``; empty if there is none.
-    command : str
-        Command that was sent; empty if there was none.
-    reply : str or bytes
-        Reply that was received; empty if there was none.
+    The message of an error on a serial line has port, command and reply.
     """
-
-    def __init__(
-        self, message: str, port: str = '', command: str = '', reply: str | bytes = ''
-    ) -> None:
-        super().__init__(message)
-        self.port, self.command, self.reply = port, command, reply
 
 
 class TransportError(DeviceError):

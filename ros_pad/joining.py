@@ -12,7 +12,7 @@ import numpy as np
 from ros_pad.records import Block, Kind
 
 WAIT_NS = 10_000_000
-"""Time for which a record waits for its missing pieces, ns."""
+"""Longest time for which a record waits for its pieces, ns, on the clock of the stamps."""
 
 SET_BACK_NS = 100_000_000
 """Step back of a stamp from which on a clock has been set back, ns; less is a late piece."""
@@ -47,14 +47,10 @@ class Joiner:
         Numbers of the legs, in the order of the rows.
     needed : sequence of str
         Fields of a complete record; without any, each piece is a record.
-    wait_ns : int
-        Longest time for which a record waits, on the clock of the stamps, ns.
     """
 
-    def __init__(
-        self, kind: Kind, legs: Sequence[int], needed: Sequence[str] = (), wait_ns: int = WAIT_NS
-    ) -> None:
-        self._kind, self._wait_ns = kind, wait_ns
+    def __init__(self, kind: Kind, legs: Sequence[int], needed: Sequence[str] = ()) -> None:
+        self._kind = kind
         self._row = {leg: row for row, leg in enumerate(legs)}
         self._columns = [(each, field.name) for field in kind.fields for each in field.columns]
         self._needed = tuple(needed)
@@ -118,9 +114,9 @@ class Joiner:
         """Return the records that have waited too long at a time on the clock of stamps, ns."""
         for stamp_ns, record in list(self._waiting.items()):
             # Without a beginning, these may be pieces whose stamps are from another clock.
-            if record.begun_ns < now_ns - self._wait_ns and not self._rows_of(record):
+            if record.begun_ns < now_ns - WAIT_NS and not self._rows_of(record):
                 self._loosen(self._waiting.pop(stamp_ns))
-        return self._give(now_ns - self._wait_ns)
+        return self._give(now_ns - WAIT_NS)
 
     def _rows_of(self, record: _Record) -> list[int]:
         """Return the rows of the legs with which a record has begun."""

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import instance, number, quantity
-from ros_pad.contact.meniscus import GRAVITY, Liquid
+from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, NoSurface
 
@@ -282,8 +282,7 @@ def bath_meniscus(wall: Wall, liquid: Liquid) -> BathMeniscus:
     """
     instance('wall', wall, Wall)
     instance('liquid', liquid, Liquid)
-    weight = liquid.density * GRAVITY
-    length = math.sqrt(liquid.surface_tension / weight)
+    weight, length = liquid.weight, liquid.capillary_length
     place, slope, status = contact(wall, liquid.angle, length)
     radius, height, _ = wall.meridian(place)
     if status == 'dry' or slope == 0.0:

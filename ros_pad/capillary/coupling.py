@@ -28,7 +28,7 @@ import numpy as np
 from ros_pad.capillary.bath import Wall, bath_height, contact
 from ros_pad.configuration import instance, number
 from ros_pad.contact.dome import press
-from ros_pad.contact.meniscus import GRAVITY, Liquid
+from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array, Pad, need_stiffness
 from ros_pad.errors import NoSurface
 
@@ -112,14 +112,13 @@ def press_wet(pad: Pad, pressure: float, force: float, liquid: Liquid) -> WetPad
     need_stiffness('a pad in a bath', pad)
     p = number('pressure', pressure, 'Pa', above=True)
     load = number('force', force, 'N', above=True)
-    weight = liquid.density * GRAVITY
     case = _Case(
         pressure=p * pad.radius / pad.stiffness,
         force=load / (pad.stiffness * pad.radius),
         tension=liquid.surface_tension / pad.stiffness,
-        weight=weight * pad.radius**2 / pad.stiffness,
+        weight=liquid.weight * pad.radius**2 / pad.stiffness,
         angle=liquid.angle,
-        length=math.sqrt(liquid.surface_tension / weight) / pad.radius,
+        length=liquid.capillary_length / pad.radius,
     )
     pressed = press(pad, p, load, model='membrane')
     size = pad.radius

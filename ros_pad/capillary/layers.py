@@ -30,7 +30,7 @@ import numpy.typing as npt
 from ros_pad.capillary.mesh import Indices, Mesh
 from ros_pad.capillary.sections import Layers, Walls, centre, layered, walls
 from ros_pad.configuration import choice, instance, integer, number
-from ros_pad.contact.meniscus import GRAVITY, Liquid, hysteresis_force
+from ros_pad.contact.meniscus import Liquid, hysteresis_force
 from ros_pad.contact.pad import Array, Floats
 from ros_pad.errors import InvalidInput, MeshError
 
@@ -394,7 +394,7 @@ def _places(
     Also returns the slices in which the liquid does not rise.
     """
     theta, tension = liquid.angle, liquid.surface_tension
-    weight = liquid.density * GRAVITY
+    weight = liquid.weight
     z, r, a = cut.heights, cut.radii, cut.inclinations
     arc = _Arc(z, r, a, theta)
 
@@ -517,7 +517,7 @@ def wet_pattern(
     if status == 'ok':
         layers_up = np.arange(z.size)
         room, shore = (np.interp(place, layers_up, each) for each in (void, pads * cut.outline))
-        if strict and room > WIDEST_GAP * _capillary_length(liquid) * shore:
+        if strict and room > WIDEST_GAP * liquid.capillary_length * shore:
             status = 'far_apart'
         elif _disagree(place, judge):
             status = 'far_off'
@@ -528,7 +528,7 @@ def wet_pattern(
 
     return WetPattern(
         height=float(height),
-        pressure=-liquid.density * GRAVITY * float(height),
+        pressure=-liquid.weight * float(height),
         volume=here(_cumulative(z, void)),
         void_area=here(void),
         status=str(status),
@@ -542,7 +542,7 @@ def _level(
     cut: Layers, void: Array, pads: int, liquid: Liquid, balance: str
 ) -> tuple[float, bool]:
     """Return where a level surface is in balance, in layers, and whether there is no rise."""
-    tension, weight = liquid.surface_tension, liquid.density * GRAVITY
+    tension, weight = liquid.surface_tension, liquid.weight
     z = cut.heights
     if balance == 'energy':
         # Minus the derivative of the energy, from smooth normals; facet areas would have steps.
@@ -584,12 +584,8 @@ def _no_arc(place: Array, cut: Walls, liquid: Liquid) -> npt.NDArray[np.bool_]:
     ring = cut.radii[rows, layer]
     mean = np.arctan2(z[layer], ring - cut.radii[:, 0])
     straight = cut.inclinations[rows, layer] - mean < _STRAIGHT
-    slender = ring < SLENDER * _capillary_length(liquid)
+    slender = ring < SLENDER * liquid.capillary_length
     return straight & (slender | ((mean > _STEEP) & (liquid.angle < WETTING)))
-
-
-def _capillary_length(liquid: Liquid) -> float:
-    return math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
 
 
 def _lowest(energy: Array) -> Array:

@@ -40,16 +40,11 @@ class Walls(NamedTuple):
     inclinations: Array
 
 
-def levels(mesh: Mesh, layers: int) -> Array:
-    """Return the heights of equal layers, from floor to top, m, shape (layers + 1,)."""
-    return np.linspace(0.0, mesh.height, layers + 1)
-
-
-def _cuts(heights: Array) -> Array:
-    """Return the heights at which to cut: floor and top are replaced by heights just inside."""
-    cuts = heights.copy()
-    cuts[0], cuts[-1] = _INSIDE * cuts[-1], (1.0 - _INSIDE) * cuts[-1]
-    return cuts
+def _levels(mesh: Mesh, layers: int) -> tuple[Array, Array]:
+    """Return heights of equal layers from floor to top, m, and where to cut: just inside."""
+    heights = np.linspace(0.0, mesh.height, layers + 1)
+    inside = _INSIDE * mesh.height, (1.0 - _INSIDE) * mesh.height
+    return heights, heights.clip(*inside)
 
 
 def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Walls:
@@ -70,8 +65,7 @@ def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Wa
         Where a half plane does not meet the wall exactly once at some height: the axis is outside
         the pad, or the section is not star-shaped as seen from the axis.
     """
-    heights = levels(mesh, layers)
-    cuts = _cuts(heights)
+    heights, cuts = _levels(mesh, layers)
     azimuths = 2.0 * math.pi * np.arange(slices) / slices
     outward = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
     # From each point to each plane; layers do not cut horizontal triangles.
@@ -93,23 +87,6 @@ def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Wa
     cell = (which[row] * len(cuts) + layer)[right]
     count = np.bincount(cell, minlength=slices * len(cuts))
     turns = _summed(cell, leaves[right], count.size)
-    _check_star(mesh, count, turns, heights, azimuths, axis)
-
-    radii, inclinations = np.empty(count.size), np.empty(count.size)
-    radii[cell] = radius[right]
-    inclinations[cell] = np.arctan2(np.sum(found[:, 3:5] * away, axis=1), -found[:, 5])[right]
-    shape = slices, len(cuts)
-    return Walls(azimuths, heights, radii.reshape(shape), inclinations.reshape(shape))
-
-
-def _check_star(
-    mesh: Mesh,
-    count: npt.NDArray[Any],
-    turns: Array,
-    heights: Array,
-    azimuths: Array,
-    axis: tuple[float, float],
-) -> None:
     for wrong, what in (
         (turns < 1, 'the axis is outside the pad'),
         (count > 1, 'a slice meets the wall more than once, so the section is not star-shaped'),
@@ -121,6 +98,12 @@ def _check_star(
                 f' {math.degrees(azimuths[j]):.3g} degrees from the x axis, axis through'
                 f' x = {axis[0]:.4g}, y = {axis[1]:.4g} m); wet_pattern accepts any shape'
             )
+
+    radii, inclinations = np.empty(count.size), np.empty(count.size)
+    radii[cell] = radius[right]
+    inclinations[cell] = np.arctan2(np.sum(found[:, 3:5] * away, axis=1), -found[:, 5])[right]
+    shape = slices, len(cuts)
+    return Walls(azimuths, heights, radii.reshape(shape), inclinations.reshape(shape))
 
 
 def _smooth_normals(mesh: Mesh, face: Indices) -> Array:
@@ -211,8 +194,7 @@ class Layers(NamedTuple):
 
 def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
     """Cut the mesh by horizontal planes; the contact angle, rad, is for ``pull`` and ``gain``."""
-    heights = levels(mesh, layers)
-    cuts = _cuts(heights)
+    heights, cuts = _levels(mesh, layers)
     corners = mesh.points[mesh.faces]
     upright = np.flatnonzero(np.ptp(corners[:, :, 2], axis=1) > 0.0)
     corners = corners[upright]

@@ -29,7 +29,7 @@ from ros_pad.capillary.layers import WETTING
 from ros_pad.capillary.mesh import Indices, Mesh
 from ros_pad.capillary.sections import centre
 from ros_pad.configuration import instance, integer, number
-from ros_pad.contact.meniscus import GRAVITY, Liquid, hysteresis_force
+from ros_pad.contact.meniscus import Liquid, hysteresis_force
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, MeshError, NoSurface
 
@@ -177,7 +177,7 @@ def wet_surface(
         rails=lambda azimuths: rails(azimuths) / size,
         outer=lambda azimuths: outer(azimuths) / size,
         cosine=math.cos(liquid.angle),
-        weight=liquid.density * GRAVITY * size**2 / liquid.surface_tension,
+        weight=liquid.weight * size**2 / liquid.surface_tension,
     )
     surface = replace(surface, points=surface.points / size)
     heights = []
@@ -324,7 +324,7 @@ def _in_bath(curves: Array, liquid: Liquid) -> tuple[_Surface, Rails]:
             why = f'reaches the top of the wall at height = {bath.height:g} m'
         raise NoSurface(f'the liquid {why}', 'rim')
     place = float(np.interp(bath.height, mean[:, 1], np.linspace(0.0, 1.0, KNOTS)))
-    length = math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
+    length = liquid.capillary_length
     far = float(curves[..., 0].max()) + REACH * length
     # Triangles are as long as wide, or shorter where the surface is curved, and grow outwards.
     step = 2.0 * math.pi / sectors
@@ -381,7 +381,7 @@ def _film_place(mean: Array, liquid: Liquid) -> float:
     radii, heights = mean.T
     lean = np.arctan2(np.gradient(heights), np.gradient(radii))
     level = float(np.interp(math.pi - liquid.angle, np.maximum.accumulate(lean), heights))
-    length = math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
+    length = liquid.capillary_length
     slopes = np.maximum(math.pi - liquid.angle - lean, 0.0)
     distance = np.maximum(radii / length, 1e-9)
     met = 2.0 * length * np.sin(0.5 * slopes) * k0e(distance) / k1e(distance) <= heights

@@ -50,7 +50,6 @@ from ros_pad.commands.folder import check_picture
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import integer, number
 from ros_pad.contact import THESIS_LIQUID, WATER, Liquid
-from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import InvalidInput, MeshError, NoSurface
 
 LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
@@ -224,7 +223,7 @@ def _values(found: Wet | WetPattern | WetSurface, direction: float) -> dict[str,
             'height_error': [-found.error, found.error],
             'height_spread_m': float(np.ptp(found.line[:, 2])),
             'ring_radius_m': float(np.hypot(*(found.line[:, :2] - found.axis).T).mean()),
-            'pressure_pa': -found.liquid.density * GRAVITY * height,
+            'pressure_pa': -found.liquid.weight * height,
             'volume_m3': found.volume,
             'pull_n': float(-found.force[2]),
         }

@@ -303,14 +303,9 @@ def _modelled_forces(friction: Friction, foot: Foot, floor: tuple[float, float])
     for pressure, load, _, wet, stance_time in zip(
         *(column.tolist() for column in friction), strict=True
     ):
-        domes = foot.dome_load(load, pressure)
-        sole = load - domes
-        films = (0.0, 0.0)
-        if wet:
-            film = Film(foot, floor[1])
-            film.touch_down(floor[0])
-            films = film.drain(domes, sole, pressure, stance_time)
-        forces.append(foot.resistance_of(domes, sole, pressure, *films))
+        film = Film(foot, floor[1])
+        film.touch_down(floor[0])
+        forces.append(foot.grip(load, pressure, film if wet else None, stance_time))
     return np.array(forces)
 
 

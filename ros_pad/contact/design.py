@@ -27,7 +27,7 @@ from ros_pad.contact.dome import inflate
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import DEFAULT_CRITERION, force_limit, largest_pressure, pressure_for
 from ros_pad.contact.material import Material
-from ros_pad.contact.meniscus import GRAVITY, Liquid
+from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import (
     LARGE_PAD,
     Floats,
@@ -129,7 +129,7 @@ def rise_height(
             'because other liquids do not rise'
         )
     share = number('cell', cell, '(radius²)', low=CELL) / math.pi
-    drawn = 2.0 * liquid.surface_tension * math.cos(liquid.angle) / (liquid.density * GRAVITY)
+    drawn = 2.0 * liquid.surface_tension * math.cos(liquid.angle) / liquid.weight
     pull = drawn / (r * r)
     # Bisection; ``y = 3/(1 + u²)`` is height over radius.
     low, high = (share - 1.6875) / pull, share / pull

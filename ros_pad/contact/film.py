@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ros_pad.configuration import number, quantity
+from ros_pad.contact.laws import drained
 from ros_pad.contact.pad import broadcast, plain
 
 if TYPE_CHECKING:
@@ -90,6 +91,13 @@ class Film:
     viscosity : float
         Dynamic viscosity of the liquid, Pa s, above 0.
 
+    Attributes
+    ----------
+    dome_drain, sole_drain : float
+        Factors of the growth of 1/h² under domes and sole, 1/(Pa s) and 1/(Pa s m²).
+    sole_area : float
+        Area of the sole, m².
+
     Raises
     ------
     InvalidInput
@@ -105,19 +113,17 @@ class Film:
     '0.122 and 300 micrometres'
     """
 
-    __slots__ = (
-        '_area', '_dome_area', '_dome_rate', '_dome_state', '_fresh', '_sole_rate', '_sole_state',
-    )  # fmt: skip
+    __slots__ = ('_fresh', '_state', 'dome_drain', 'sole_area', 'sole_drain')
 
     def __init__(self, foot: Foot, viscosity: float = WATER_VISCOSITY) -> None:
         number('viscosity', viscosity, 'Pa s', above=True)
         # Each of n domes has a disc of radius b, b² = A/(n π), with total area A = N/p, so
         # d(1/h²)/dt = 4 π n p / (3 η A).
-        self._dome_rate = 4.0 * math.pi * foot.pads / (3.0 * viscosity)
-        self._sole_rate = 4.0 / (3.0 * viscosity * foot.sole_radius**2)
-        self._area = foot.sole_area
-        self._dome_area = 0.0
-        self._dome_state = self._sole_state = self._fresh = math.inf
+        self.dome_drain = 4.0 * math.pi * foot.pads / (3.0 * viscosity)
+        self.sole_drain = 4.0 / (3.0 * viscosity * foot.sole_radius**2)
+        self.sole_area = foot.sole_area
+        self._fresh = math.inf
+        self._state = 0.0, math.inf, math.inf
 
     def touch_down(self, thickness: float) -> None:
         """Start a stance on a film.
@@ -134,8 +140,7 @@ class Film:
         """
         thickness = number('thickness', thickness, 'm')
         self._fresh = thickness**-2 if thickness > 0.0 else math.inf
-        self._dome_state = self._sole_state = self._fresh
-        self._dome_area = 0.0
+        self._state = 0.0, self._fresh, self._fresh
 
     def drain(
         self, dome_load: float, sole_load: float, pressure: float, duration: float
@@ -154,27 +159,9 @@ class Film:
         Returns
         -------
         tuple of float
-            :attr:`under_domes` and :attr:`under_sole`, m.
+            Thickness of the film under domes and flat sole, m.
         """
-        if dome_load > 0.0:
-            area = dome_load / pressure
-            if area > self._dome_area and self._fresh < math.inf:
-                old = self._dome_area / area
-                self._dome_state = self._fresh + old * (self._dome_state - self._fresh)
-            self._dome_area = area
-            self._dome_state += self._dome_rate * pressure / area * duration
-        else:
-            self._dome_area = 0.0
-        if sole_load > 0.0:
-            self._sole_state += self._sole_rate * sole_load / self._area * duration
-        return self._dome_state**-0.5, self._sole_state**-0.5
-
-    @property
-    def under_domes(self) -> float:
-        """Film thickness under the domes, m."""
-        return self._dome_state**-0.5
-
-    @property
-    def under_sole(self) -> float:
-        """Film thickness under the flat part of the sole, m."""
-        return self._sole_state**-0.5
+        self._state = drained(
+            self, self._fresh, self._state, dome_load, sole_load, pressure, duration
+        )
+        return self._state[1] ** -0.5, self._state[2] ** -0.5

@@ -182,8 +182,12 @@ def largest_pressure(pad: Pad) -> float:
 
 def criteria(pad: Pad) -> tuple[str, ...]:
     """Return the criteria that a pad has: ``measured`` is one of pads that were measured."""
-    known = pad.measured_limit is not None or _is_large_pad(pad)
-    return CRITERIA if known else CRITERIA[:-1]
+    alike = (
+        math.isclose(getattr(pad, name), getattr(LARGE_PAD, name), rel_tol=1e-9)
+        for name in ('radius', 'stiffness')
+    )
+    of_thesis = pad.material is None and all(alike)  # the pad that the thesis measured
+    return CRITERIA if of_thesis or pad.measured_limit is not None else CRITERIA[:-1]
 
 
 def check_criterion(pad: Pad, criterion: str, name: str = 'criterion') -> None:
@@ -195,14 +199,6 @@ def check_criterion(pad: Pad, criterion: str, name: str = 'criterion') -> None:
             f'{name} = {criterion!r} is not allowed for {pad}: no force limit was measured on it;'
             f' a measured_limit of the pad, or one of {", ".join(criteria(pad))} is needed'
         )
-
-
-def _is_large_pad(pad: Pad) -> bool:
-    """Return whether this is the pad on which the thesis measured force limits."""
-    return pad.material is None and all(
-        math.isclose(getattr(pad, name), getattr(LARGE_PAD, name), rel_tol=1e-9)
-        for name in ('radius', 'stiffness')
-    )
 
 
 def _model_end(pad: Pad) -> tuple[float, str]:

@@ -95,6 +95,16 @@ class Liquid:
             return float(contact_angle(self.solid_tension, self.surface_tension))
         return self.contact_angle
 
+    @property
+    def weight(self) -> float:
+        """Specific weight, N/m³."""
+        return self.density * GRAVITY
+
+    @property
+    def capillary_length(self) -> float:
+        """Height, m, at which weight and surface tension are about equal."""
+        return math.sqrt(self.surface_tension / self.weight)
+
 
 WATER = Liquid(surface_tension=0.073, solid_tension=0.027)
 """Water at 20 °C on silicone: tensions 0.073 and 0.027 N/m, contact angle 77.5 degrees."""
@@ -188,7 +198,7 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
     rise = np.where(touching, rise, 1.0)
     corrected = reading == 'corrected'
     tension = liquid.surface_tension if corrected else liquid.solid_tension
-    m = 6.0 * tension * rise * across / (liquid.density * GRAVITY * b**3)
+    m = 6.0 * tension * rise * across / (liquid.weight * b**3)
     y = np.sqrt(0.5 * m)
     if corrected:
         for _ in range(7):  # convex, and 3.80 is above the root: Newton's method converges

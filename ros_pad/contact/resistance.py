@@ -22,19 +22,23 @@ import math
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ros_pad import configuration
 from ros_pad.configuration import Setting, Table, choice, instance, integer, number, quantity
+from ros_pad.contact import laws
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, check_criterion, force_limit
 from ros_pad.contact.material import Material, factor_in
 from ros_pad.contact.pad import MeasuredLimit, Pad, broadcast, plain
 from ros_pad.errors import ConfigError, InvalidInput, NoEquilibrium
+
+if TYPE_CHECKING:
+    from ros_pad.contact.film import Film
 
 THICK_FILM = 1.0e-3
 """Thickness of a liquid film that does not drain under a flat sole within a stance, m."""
@@ -164,7 +168,7 @@ class Foot:
         choice('limit', self.limit, CRITERIA)
         check_criterion(self.pad, self.limit, 'force_limit')
         try:
-            _ = self._limit_table, self._limit_cell
+            _ = self.limits
         except (NoEquilibrium, InvalidInput) as error:
             raise InvalidInput(f'ceiling = {self.ceiling:g} Pa is not allowed: {error}') from error
 
@@ -211,16 +215,22 @@ class Foot:
         """Area of the sole, m²."""
         return math.pi * self.sole_radius**2
 
+    @property
+    def capillary(self) -> float:
+        """Tangential force of the liquid around all domes, N."""
+        return self.pads * self.capillary_force
+
     @cached_property
-    def _limit_table(self) -> tuple[float, ...]:
+    def limits(self) -> tuple[float, ...]:
         """Force limits of all pads, N, in equal steps of about 0.5 kPa up to the ceiling."""
         cells = math.ceil(self.ceiling / 500.0)
         limits = _limits(self.pad, self.ceiling, cells, self.limit)
         return tuple(self.pads * each for each in limits)
 
     @cached_property
-    def _limit_cell(self) -> float:
-        return self.ceiling / (len(self._limit_table) - 1)
+    def limit_cell(self) -> float:
+        """Step of pressure between them, Pa."""
+        return self.ceiling / (len(self.limits) - 1)
 
     def on_rough(self, roughness: float) -> Foot:
         """Return the foot with its constants on a rough floor.
@@ -297,58 +307,29 @@ class Foot:
             Normal force on the domes, N: at most their force limit; above the ceiling, that at the
             ceiling.
         """
-        if pressure <= 0.0:
-            return 0.0
-        place = pressure / self._limit_cell
-        index, table = int(place), self._limit_table
-        if index >= len(table) - 1:
-            limit = table[-1]
-        else:
-            limit = table[index] + (place - index) * (table[index + 1] - table[index])
-        return load if load < limit else limit
+        return laws.dome_load(self, load, pressure)
 
-    def resistance_of(
-        self,
-        dome_load: float,
-        sole_load: float,
-        pressure: float,
-        dome_film: float,
-        sole_film: float,
+    def grip(
+        self, load: float, pressure: float, film: Film | None = None, duration: float = 0.0
     ) -> float:
-        """Return the tangential resistance, N, for given loads of domes and flat sole.
-
-        For speed the input is not checked; scalars only.
+        """Return the tangential resistance, N; for speed the input is not checked.
 
         Parameters
         ----------
-        dome_load, sole_load : float
-            Normal force on the domes and on the flat sole, N, from 0.
+        load : float
+            Normal force on the foot, N, from 0.
         pressure : float
             Gauge pressure, Pa, from 0.
-        dome_film, sole_film : float
-            Thickness of the film under the domes and under the flat sole, m, from 0 (dry).
+        film : Film, optional
+            Film on which the foot stands; by default the ground is dry.
+        duration : float
+            Time for which the film drains before, s, from 0.
         """
-        total = under_domes = 0.0
-        if dome_load > 0.0:
-            # Below the conforming pressure, only a share of the dome's contact area touches.
-            conforming = self.conforming_pressure
-            under_domes = dome_load / (pressure if pressure > conforming else conforming)
-            total = self.friction * dome_load + self.shear_strength * under_domes
-            if dome_film > 0.0:
-                total = self._on_film(total, dome_load, dome_film)
-                total += self.pads * self.capillary_force
-        if sole_load > 0.0:
-            area = sole_load / self.conforming_pressure
-            if area > self.sole_area - under_domes:
-                area = self.sole_area - under_domes
-            dry = self.friction * sole_load + self.shear_strength * area
-            total += self._on_film(dry, sole_load, sole_film) if sole_film > 0.0 else dry
-        return total
-
-    def _on_film(self, dry: float, load: float, film: float) -> float:
-        """Return the resistance, N, on a film, from the dry resistance and the load, N."""
-        touching = math.exp(-((film / self.critical_film) ** self.film_exponent))
-        return touching * dry + (1.0 - touching) * self.boundary_friction * load
+        on_domes = self.dome_load(load, pressure)
+        on_sole, films = load - on_domes, (0.0, 0.0)
+        if film is not None:
+            films = film.drain(on_domes, on_sole, pressure, duration)
+        return laws.resistance(self, on_domes, on_sole, pressure, *films)
 
 
 @functools.lru_cache(maxsize=64)
@@ -434,7 +415,8 @@ def tangential_resistance(
 
     def one(load: float, pressure: float, dome_film: float, sole_film: float) -> float:
         on_domes = foot.dome_load(load, pressure)
-        return foot.resistance_of(on_domes, load - on_domes, pressure, dome_film, sole_film)
+        films = dome_film, sole_film
+        return laws.resistance(foot, on_domes, load - on_domes, pressure, *films)
 
     return plain(np.vectorize(one, otypes=[float])(*values))
 

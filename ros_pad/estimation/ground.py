@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ros_pad.contact import laws
 from ros_pad.contact.resistance import THICK_FILM, Foot
 from ros_pad.estimation import alarm, doubt
 from ros_pad.estimation.doubt import Doubt
@@ -251,9 +252,9 @@ class Ground:
         """
         if dome_share > DOMED:
             return 1.0, 1.0
-        kernel, prior = self.foot.resistance_of, self.filter.shared.prior
-        dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
-        wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
+        prior = self.filter.shared.prior
+        dry = self.foot.grip(load, 0.0) / load
+        wet = laws.resistance(self.foot, 0.0, load, 0.0, 0.0, THICK_FILM) / load
         # Friction that is zero at one load is zero at all.
         return (
             dry / prior.flat_dry if prior.flat_dry else 1.0,

@@ -78,11 +78,6 @@ class FaultSchedule:
 class Valve:
     """A valve whose outlet pressure follows its set-point with one time constant.
 
-    Parameters
-    ----------
-    time_constant : float
-        s, above 0.
-
     Attributes
     ----------
     setpoint : float
@@ -91,8 +86,10 @@ class Valve:
         Whether the pressure stays as it is, whatever the set-point.
     """
 
-    def __init__(self, time_constant: float) -> None:
-        self._time_constant = number('time_constant', time_constant, 's', above=True)
+    TIME_CONSTANT = 0.1
+    """Time constant, s."""
+
+    def __init__(self) -> None:
         self._start, self._time = 0.0, time.monotonic()
         self.setpoint, self.held = 0.0, False
 
@@ -106,7 +103,7 @@ class Valve:
         """Present pressure, gauge Pa."""
         if self.held:
             return self._start
-        left = math.exp((self._time - time.monotonic()) / self._time_constant)
+        left = math.exp((self._time - time.monotonic()) / self.TIME_CONSTANT)
         return self.setpoint + (self._start - self.setpoint) * left
 
 
@@ -119,8 +116,6 @@ class EmulatedDevice(ABC):
         Names of the devices on the bus.
     full_scale : float
         Highest pressure, gauge Pa, above 0.
-    time_constant : float
-        Time constant of the pressures, s, above 0.
     schedule : sequence of str
         See :class:`FaultSchedule`.
     """
@@ -132,14 +127,10 @@ class EmulatedDevice(ABC):
     terminator = '\n'
 
     def __init__(
-        self,
-        addresses: Sequence[str],
-        full_scale: float,
-        time_constant: float,
-        schedule: Sequence[str],
+        self, addresses: Sequence[str], full_scale: float, schedule: Sequence[str]
     ) -> None:
         self.full_scale = number('full_scale', full_scale, 'Pa', above=True)
-        self.valves = {each: Valve(time_constant) for each in addresses}
+        self.valves = {each: Valve() for each in addresses}
         self.faults = FaultSchedule(self.FAULTS, schedule)
 
     @abstractmethod
@@ -235,8 +226,7 @@ class Emulator:
         except OSError as error:
             self._unplug()
             raise TransportError(
-                f'link = {self._link!r}: the device cannot be plugged in: {error.strerror}',
-                self._link,
+                f'link = {self._link!r}: the device cannot be plugged in: {error.strerror}'
             ) from error
 
     def _unplug(self) -> None:
@@ -302,8 +292,6 @@ class AlicatEmulator(EmulatedDevice):
         9v00 it reads every command that begins with L as the lock of the front panel.
     full_scale : float
         Highest set-point, gauge Pa, above 0; the reply to a higher one is ``?``.
-    time_constant : float
-        Time constant of the pressure, s, above 0.
     schedule : sequence of str
         See :class:`FaultSchedule`.
     """
@@ -321,7 +309,6 @@ class AlicatEmulator(EmulatedDevice):
         units: str = 'kPa',
         firmware: str = '10v20',
         full_scale: float = 150e3,
-        time_constant: float = 0.1,
         schedule: Sequence[str] = (),
     ) -> None:
         for name, value, pattern in (
@@ -335,7 +322,7 @@ class AlicatEmulator(EmulatedDevice):
         self._firmware = firmware
         self._version = tuple(int(each) for each in firmware.split('v'))
         self.locked: set[str] = set()
-        super().__init__(unit_ids, full_scale, time_constant, schedule)
+        super().__init__(unit_ids, full_scale, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the ID of the unit that answers and its reply; None if there is no such unit."""
@@ -401,18 +388,14 @@ class SmcItvEmulator(EmulatedDevice):
     ----------
     full_scale : float
         Gauge Pa at the setting 1023, above 0.
-    time_constant : float
-        Time constant of the pressure, s, above 0.
     schedule : sequence of str
         See :class:`FaultSchedule`.
     """
 
     terminator = '\r\n'
 
-    def __init__(
-        self, full_scale: float = 100e3, time_constant: float = 0.1, schedule: Sequence[str] = ()
-    ) -> None:
-        super().__init__([''], full_scale, time_constant, schedule)
+    def __init__(self, full_scale: float = 100e3, schedule: Sequence[str] = ()) -> None:
+        super().__init__([''], full_scale, schedule)
         self._count = full_scale / FULL_COUNT
 
     def answer(self, command: str) -> tuple[str, str] | None:
@@ -441,21 +424,15 @@ class SerialTextEmulator(EmulatedDevice):
         Number of regulators, 1 to 99.
     full_scale : float
         Gauge Pa at 5 V, above 0.
-    time_constant : float
-        Time constant of the pressures, s, above 0.
     schedule : sequence of str
         See :class:`FaultSchedule`.
     """
 
     def __init__(
-        self,
-        channels: int = 6,
-        full_scale: float = 100e3,
-        time_constant: float = 0.1,
-        schedule: Sequence[str] = (),
+        self, channels: int = 6, full_scale: float = 100e3, schedule: Sequence[str] = ()
     ) -> None:
         names = [str(each + 1) for each in range(integer('channels', channels, 1, 99))]
-        super().__init__(names, full_scale, time_constant, schedule)
+        super().__init__(names, full_scale, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Return the channel that a command names, and the reply to it."""

@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-import math
-from numbers import Real
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from ros_pad.errors import InvalidInput, LimitError
+from ros_pad.configuration import number
+from ros_pad.errors import LimitError
 
 CEILING = 90e3
 """Highest set-point of a regulator unless its options give another one, gauge Pa."""
@@ -104,18 +103,10 @@ def permitted(gauge_pa: float, ceiling: float) -> float:
     LimitError
         When it is above the ceiling.
     """
-    # The type first, because isinstance of an abstract class takes long.
-    number = type(gauge_pa) is float or (
-        isinstance(gauge_pa, Real) and not isinstance(gauge_pa, bool)
-    )
-    if not number or not math.isfinite(gauge_pa) or gauge_pa < 0.0:
-        raise InvalidInput(
-            f'set-point {gauge_pa!r} Pa is not allowed: a number from 0 to {ceiling:g} Pa gauge is'
-            ' needed'
-        )
-    if gauge_pa > ceiling:
+    setpoint = number('set-point', gauge_pa, f'Pa gauge and at most {ceiling:g} Pa')
+    if setpoint > ceiling:
         raise LimitError(
-            f'set-point {gauge_pa:g} Pa is refused: it is above the ceiling of {ceiling:g} Pa'
+            f'set-point {setpoint:g} Pa is refused: it is above the ceiling of {ceiling:g} Pa'
             ' gauge; the old set-point stays in force'
         )
-    return float(gauge_pa)
+    return setpoint

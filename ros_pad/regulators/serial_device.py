@@ -81,8 +81,7 @@ class SerialLine:
 
     def error(self, kind: type[DeviceError], what: str, command: str, reply: Any) -> DeviceError:
         """Return an error that names the problem, the port, the command and the reply."""
-        words = f'{what}: port {self.port}, command {command!r}, reply {reply!r}'
-        return kind(words, self.port, command, reply)
+        return kind(f'{what}: port {self.port}, command {command!r}, reply {reply!r}')
 
 
 class Bus:

@@ -367,14 +367,11 @@ def _curves(
 
 def _capacity(inputs: Inputs, foot: Foot, loads: Array, pressure: float, wet: bool) -> Array:
     """Return the capacity under loads, N."""
-    most, rough = foot.dome_load(math.inf, pressure), foot.on_rough(inputs['roughness'])
-    films, drained, found = (0.0, 0.0), Film(rough), []
+    rough, found = foot.on_rough(inputs['roughness']), []
+    film = Film(rough)
     for load in loads.tolist():
-        on_domes = min(load, most)
-        if wet:
-            drained.touch_down(inputs['film'])
-            films = drained.drain(on_domes, load - on_domes, pressure, inputs['stand'])
-        found.append(rough.resistance_of(on_domes, load - on_domes, pressure, *films))
+        film.touch_down(inputs['film'])
+        found.append(rough.grip(load, pressure, film if wet else None, inputs['stand']))
     return np.array(found)
 
 

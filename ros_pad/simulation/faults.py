@@ -64,29 +64,29 @@ LATEST = 1e9
 LEAK_CRITICAL_RATIO = 0.5
 """Critical pressure ratio b of a hole: that of a nozzle is 0.53, that of a knife edge lower."""
 
-# Keys of each kind besides its time and legs: unit, lowest, highest, default (None: required).
-_QUANTITIES: dict[str, dict[str, tuple[str, float, float, float | None]]] = {
-    'stuck_valve': {},
-    'supply_loss': {
-        'pressure': ('Pa', 0.0, 1e6, 0.0),
-        'time_constant': ('s', 0.0, 3600.0, 1.0),
-    },
-    'leak': {'conductance': ('m³/(s Pa)', 1e-14, 1e-6, None)},
-    'sensor_drift': {
-        'offset': ('Pa', -1e5, 1e5, None),
-        'rise': ('s', 0.0, 1e6, 0.0),
-    },
-    'silence': {},
-    'force_dead': {},
-    'force_frozen': {},
-    'force_offset': {'load': ('N', -1e4, 1e4, None)},
-    'force_range': {'load': ('N', 1e-3, 1e5, None)},
-    'marker_frozen': {},
-    'imu_silent': {},
-    'joints_silent': {},
+# Keys of each kind besides its time and legs.
+_OWN: dict[str, tuple[Setting, ...]] = {
+    'stuck_valve': (),
+    'supply_loss': (
+        Setting('pressure', 0.0, '', 'Pa', 0.0, 1e6),
+        Setting('time_constant', 1.0, '', 's', 0.0, 3600.0),
+    ),
+    'leak': (Setting('conductance', float, '', 'm³/(s Pa)', 1e-14, 1e-6),),
+    'sensor_drift': (
+        Setting('offset', float, '', 'Pa', -1e5, 1e5),
+        Setting('rise', 0.0, '', 's', 0.0, 1e6),
+    ),
+    'silence': (),
+    'force_dead': (),
+    'force_frozen': (),
+    'force_offset': (Setting('load', float, '', 'N', -1e4, 1e4),),
+    'force_range': (Setting('load', float, '', 'N', 1e-3, 1e5),),
+    'marker_frozen': (),
+    'imu_silent': (),
+    'joints_silent': (),
 }
 _LEGS = Setting('legs', list, 'Legs that have the fault.', low=1, high=8)
-KINDS = tuple(_QUANTITIES)
+KINDS = tuple(_OWN)
 """Kinds of fault."""
 
 BODY_KINDS = ('imu_silent', 'joints_silent')
@@ -153,11 +153,11 @@ class Fault:
             raise InvalidInput(
                 f'legs = {self.legs!r} is not allowed: a fault of kind {self.kind} is of the body'
             )
-        own = _QUANTITIES[self.kind]
+        own = {setting.name: setting for setting in _OWN[self.kind]}
         for name in ('pressure', 'time_constant', 'conductance', 'offset', 'rise', 'load'):
             value = getattr(self, name)
             if name in own:
-                number(name, value, *own[name][:3])
+                own[name].accept(value)
             elif value:
                 raise InvalidInput(
                     f'{name} = {value!r} is not allowed: a fault of kind {self.kind} has none'
@@ -172,11 +172,9 @@ class Fault:
         ConfigError
             When a key is missing or unknown, or a value is not allowed.
         """
-        own = _QUANTITIES[kind := table.choice('kind', KINDS)]
-        values: dict[str, Any] = {name: each[3] for name, each in own.items()}
-        for name in ('start', 'end', *own):
-            if name in table or values.get(name, 0.0) is None:
-                values[name] = table.number(name, '')
+        kind = table.choice('kind', KINDS)
+        values = table.values(_OWN[kind])
+        values |= {name: table.number(name, 's') for name in ('start', 'end') if name in table}
         if 'legs' in table:
             values['legs'] = tuple(table.value(_LEGS))
         table.finish()
@@ -209,7 +207,8 @@ class Fault:
             values['end'] = self.end
         if self.legs:
             values['legs'] = self.legs
-        return json.dumps(values | {name: getattr(self, name) for name in _QUANTITIES[self.kind]})
+        values |= {setting.name: getattr(self, setting.name) for setting in _OWN[self.kind]}
+        return json.dumps(values)
 
     def acts_at(self, time: float) -> bool:
         """Return whether the fault acts at a time, s."""

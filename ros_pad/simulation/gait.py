@@ -100,6 +100,21 @@ class WalkingGait:
         middle = self.cycle / 4.0
         return self.body_advance(middle + half) - self.body_advance(middle)
 
+    def planted(self) -> list[tuple[float, float]]:
+        """Return phase, and distance ahead of home, m, of each foot at time 0.
+
+        The feet are placed as if the gait had run before.
+        """
+        reach, found = self.reach(), []
+        for leg in range(len(self.middles)):
+            phase = self.phase(leg, 0.0)
+            if phase < self.duty:
+                ahead = reach + self.body_advance(-phase * self.cycle)
+            else:
+                ahead = (2.0 * self.swing(phase)[0] - 1.0) * reach
+            found.append((phase, ahead))
+        return found
+
     def swing(self, phase: float) -> tuple[float, float]:
         """Return the progress of a swing, 0 to 1, and the height of the foot, m, at a phase.
 
@@ -133,16 +148,9 @@ class FootPath:
         self._homes = homes
         self._reach = gait.reach()
         self._advance = gait.body_advance(0.0)
-        self._offsets: list[tuple[float, float]] = []
-        self.swings: list[bool] = []
-        for leg in range(len(homes)):
-            phase = gait.phase(leg, 0.0)
-            self.swings.append(phase >= gait.duty)
-            if self.swings[leg]:
-                ahead = (2.0 * gait.swing(phase)[0] - 1.0) * self._reach
-            else:
-                ahead = self._reach + gait.body_advance(-phase * gait.cycle)
-            self._offsets.append((ahead, 0.0))
+        planted = gait.planted()
+        self.swings = [phase >= gait.duty for phase, _ in planted]
+        self._offsets = [(ahead, 0.0) for _, ahead in planted]
         self._lifted = list(self._offsets)
         self.feet = list(homes)
         self.move(0.0, 0.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ros_pad.contact import pressure_for
+from ros_pad.contact import laws, pressure_for
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import NoEquilibrium
@@ -131,8 +131,8 @@ class Stand:
 
     def resistance(self, dome_film: float, sole_film: float) -> float:
         """Return the tangential resistance, N, on films under domes and sole, m."""
-        return self.foot.resistance_of(
-            self.on_domes, self.on_sole, self.pressure, dome_film, sole_film
+        return laws.resistance(
+            self.foot, self.on_domes, self.on_sole, self.pressure, dome_film, sole_film
         )
 
     @property

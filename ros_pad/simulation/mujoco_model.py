@@ -42,16 +42,12 @@ class SolverSettings:
     impratio : float
         Stiffness of friction over that of the normal contact, 1 to 1e4. A foot at a share of its
         friction limit creeps at a speed proportional to 1/impratio; shorter steps do not help.
-    noslip_iterations : int
-        Iterations of the solver that removes the creep afterwards, 0 to 100; for elliptic cones
-        only.
     """
 
     timestep: float = 2e-3
     integrator: str = 'implicitfast'
     cone: str = 'elliptic'
     impratio: float = 100.0
-    noslip_iterations: int = 0
 
 
 RECOMMENDED = SolverSettings()
@@ -129,7 +125,6 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
   <compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
   <option timestep="{dt!r}" integrator="{settings.integrator}" cone="{settings.cone}"
           impratio="{settings.impratio!r}" tolerance="1e-6" jacobian="sparse"
-          noslip_iterations="{settings.noslip_iterations}"
           gravity="{-GRAVITY * math.sin(slope)!r} 0 {-GRAVITY * math.cos(slope)!r}">
     <flag autoreset="disable"/>
   </option>

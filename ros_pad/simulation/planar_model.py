@@ -7,6 +7,7 @@ import math
 from collections import namedtuple
 from typing import Any
 
+from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import CELL, WIDTH, Floor
@@ -48,7 +49,8 @@ PlanarFloor = namedtuple(
 def model_of(scene: Scene, floor: Floor, period: float) -> PlanarModel:
     """Return the constants of a walk of a scene's robot on a floor."""
     (body, gait), tow, slope = scene.legged, scene.tow, scene.floor.slope
-    foot, viscosity = scene.foot.on_rough(scene.floor.roughness), scene.floor.viscosity
+    foot = scene.foot.on_rough(scene.floor.roughness)
+    film = Film(foot, scene.floor.viscosity)
     down, heights = GRAVITY * math.cos(slope), floor.heights
     rocks = 1e-9 * max(x * x + y * y for x, y in body.homes)
     return PlanarModel(
@@ -76,11 +78,8 @@ def model_of(scene: Scene, floor: Floor, period: float) -> PlanarModel:
         foot=_filled(
             PlanarFoot,
             foot,
-            capillary=foot.pads * foot.capillary_force,
-            dome_drain=4.0 * math.pi * foot.pads / (3.0 * viscosity),
-            sole_drain=4.0 / (3.0 * viscosity * foot.sole_radius**2),
-            limit_cell=foot._limit_cell,
-            limits=foot._limit_table,
+            dome_drain=film.dome_drain,
+            sole_drain=film.sole_drain,
         ),
         floor=PlanarFloor(
             puddle=floor.film_thickness**-2 if floor.film_thickness > 0.0 else math.inf,

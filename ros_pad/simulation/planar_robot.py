@@ -11,7 +11,6 @@ The step itself is :mod:`ros_pad.simulation.planar_step`, in plain Python or com
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +20,7 @@ from ros_pad.configuration import instance, number
 from ros_pad.errors import NoConvergence
 from ros_pad.records import Array
 from ros_pad.simulation import compiled, planar_step
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.planar_model import model_of
 from ros_pad.simulation.robot import FootState, Vector, check_pressures, check_reach
 from ros_pad.simulation.scene import Scene
@@ -98,25 +98,20 @@ class PlanarRobot:
         self.model = model_of(scene, floor, period)
         self.state: Any = [0.0] * planar_step.BODY
         self.table: Any = [[0.0] * len(self.legs) for _ in range(planar_step.FEET)]
-        self._plant()
+        self._plant(scene.legged[1])
         self._step: compiled.Step = planar_step.step
         if compile_steps:
             self._compile()
         self._report()
 
-    def _plant(self) -> None:
+    def _plant(self, gait: WalkingGait) -> None:
         """Place the feet as if the gait had been running before time zero."""
-        model, gait, table = self.model, self.model.gait, self.table
-        for index in range(len(self.legs)):
-            phase = (gait.duty / 2.0 - gait.middles[index]) % 1.0
-            if phase < gait.duty:
-                offset = gait.reach + planar_step.body_advance(gait, -phase * gait.cycle)
-            else:
-                offset = -gait.reach * math.cos(math.pi * (phase - gait.duty) / (1.0 - gait.duty))
+        table = self.table
+        for index, (phase, offset) in enumerate(gait.planted()):
             table[planar_step.PHASE][index] = phase
             table[planar_step.OFFSET_X][index] = table[planar_step.LIFTED_X][index] = offset
             if phase < gait.duty:
-                planar_step.touch_down(model, self.state, table, index)
+                planar_step.touch_down(self.model, self.state, table, index)
 
     def _compile(self) -> None:
         model = self.model

@@ -4,19 +4,16 @@
 The same source runs as plain Python, on lists, and as machine code, on arrays (see
 :mod:`ros_pad.simulation.compiled`). Plain and compiled code give the same numbers to the last bit,
 so that a seed gives the same walk with and without a compiler. Therefore the code uses only
-operations that plain and compiled code round in the same way (``sqrt``, but no ``hypot``). All
-functions are in one file because numba renews its copy on disk only when the file of the outermost
-function has changed.
-
-Gait, film and resistance are those of :class:`ros_pad.simulation.gait.WalkingGait`,
-:class:`ros_pad.contact.film.Film` and :class:`ros_pad.contact.Foot`; tests compare them.
+operations that plain and compiled code round in the same way (``sqrt``, but no ``hypot``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, exp, inf, pi, sin, sqrt
+from math import cos, inf, pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
+
+from ros_pad.contact.laws import dome_load, drained, resistance
 
 if TYPE_CHECKING:
     from ros_pad.simulation.planar_model import PlanarModel
@@ -320,14 +317,22 @@ def grip(
         home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
         x, y = cosine * home_x - sine * home_y, sine * home_x + cosine * home_y
         pressure = pressures[index]
-        on_domes = dome_load(model, load, pressure)
+        on_domes = dome_load(model.foot, load, pressure)
         dome_film = sole_film = 0.0
         feet[WET][index] = 0.0
         if is_wet(model, body[X] + x, body[Y] + y):
             feet[WET][index] = 1.0
-            drain(model, feet, index, on_domes, load - on_domes, pressure)
-            dome_film, sole_film = feet[DOME_FILM][index] ** -0.5, feet[SOLE_FILM][index] ** -0.5
-        cap = resistance(model, on_domes, load - on_domes, pressure, dome_film, sole_film)
+            state = feet[DOME_AREA][index], feet[DOME_FILM][index], feet[SOLE_FILM][index]
+            area, domes, sole = drained(
+                model.foot, feet[FRESH][index], state, on_domes, load - on_domes, pressure, dt
+            )
+            feet[DOME_AREA][index], feet[DOME_FILM][index], feet[SOLE_FILM][index] = (
+                area,
+                domes,
+                sole,
+            )
+            dome_film, sole_film = domes**-0.5, sole**-0.5
+        cap = resistance(model.foot, on_domes, load - on_domes, pressure, dome_film, sole_film)
         feet[CAP][index] = cap
         if pressure > 0.0 and on_domes < load:
             feet[OVERLOAD][index] += dt
@@ -341,74 +346,6 @@ def grip(
                 radius, cap, stiffness * dt,
             ))  # fmt: skip
     return contacts
-
-
-def dome_load(model: PlanarModel, load: float, pressure: float) -> float:
-    """Return the part of a load, N, that domes carry at a gauge pressure, Pa."""
-    if pressure <= 0.0:
-        return 0.0
-    place = pressure / model.foot.limit_cell
-    table, last = model.foot.limits, len(model.foot.limits) - 1
-    if place >= last:
-        limit = table[last]
-    else:
-        index = int(place)
-        limit = table[index] + (place - index) * (table[index + 1] - table[index])
-    return load if load < limit else limit
-
-
-def drain(
-    model: PlanarModel, feet: Any, index: int, on_domes: float, on_sole: float, pressure: float
-) -> None:
-    """Drain the film under a foot for a period."""
-    if on_domes > 0.0:
-        area = on_domes / pressure
-        fresh = feet[FRESH][index]
-        if area > feet[DOME_AREA][index] and fresh < inf:
-            # Under the area that is new in this step, the film has not drained yet.
-            old = feet[DOME_AREA][index] / area
-            feet[DOME_FILM][index] = fresh + old * (feet[DOME_FILM][index] - fresh)
-        feet[DOME_AREA][index] = area
-        feet[DOME_FILM][index] += model.foot.dome_drain * pressure / area * model.period
-    else:
-        feet[DOME_AREA][index] = 0.0
-    if on_sole > 0.0:
-        feet[SOLE_FILM][index] += (
-            model.foot.sole_drain * on_sole / model.foot.sole_area * model.period
-        )
-
-
-def resistance(
-    model: PlanarModel,
-    on_domes: float,
-    on_sole: float,
-    pressure: float,
-    dome_film: float,
-    sole_film: float,
-) -> float:
-    """Return the tangential capacity of a foot, N."""
-    total = under_domes = 0.0
-    foot, conforming = model.foot, model.foot.conforming_pressure
-    if on_domes > 0.0:
-        under_domes = on_domes / (pressure if pressure > conforming else conforming)
-        dry = foot.friction * on_domes + foot.shear_strength * under_domes
-        total += on_film(model, dry, on_domes, dome_film)
-        if dome_film > 0.0:
-            total += foot.capillary
-    if on_sole > 0.0:
-        free, touched = foot.sole_area - under_domes, on_sole / conforming
-        dry = foot.friction * on_sole + foot.shear_strength * (touched if touched < free else free)
-        total += on_film(model, dry, on_sole, sole_film)
-    return total
-
-
-def on_film(model: PlanarModel, dry: float, load: float, film: float) -> float:
-    """Return the resistance of a contact on a film, N; ``dry`` is its resistance without one."""
-    if film <= 0.0:
-        return dry
-    foot = model.foot
-    touching = exp(-((film / foot.critical_film) ** foot.film_exponent))
-    return touching * dry + (1.0 - touching) * foot.boundary_friction * load
 
 
 def newton(

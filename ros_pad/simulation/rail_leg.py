@@ -122,16 +122,12 @@ class RailLeg:
             self._film.touch_down(self._floor.depth(self._x + offset, 0.0))
         state.standing = stands
         cap = 0.0
-        overloaded = False
         if stands:
             load, pressure = body.load, pressures[0]
-            domes = foot.dome_load(load, pressure)
-            overloaded = pressure > 0.0 and domes < load
             state.wet = self._floor.wet(self._x + offset, 0.0)
-            films = (0.0, 0.0)
-            if state.wet:
-                films = self._film.drain(domes, load - domes, pressure, dt)
-            cap = foot.resistance_of(domes, load - domes, pressure, *films)
+            cap = foot.grip(load, pressure, self._film if state.wet else None, dt)
+            if pressure > 0.0 and foot.dome_load(load, pressure) < load:
+                state.overload_time += dt
         free = self.speed - GRAVITY * math.sin(self._scene.floor.slope) * dt
         self.speed, force = push(free, back, cap, body, dt)
         self._x += self.speed * dt
@@ -143,8 +139,6 @@ class RailLeg:
         state.slip_speed = abs(slip)
         state.slip_path += abs(slip) * dt
         self.dissipation += cap * abs(slip) * dt
-        if overloaded:
-            state.overload_time += dt
 
 
 def push(free: float, back: float, cap: float, body: RailBody, dt: float) -> tuple[float, float]:

@@ -423,11 +423,6 @@ class Scene:
         faults = [str(each) for each in self.faults if each.kind in AIR_KINDS]
         return self.regulator | ({'faults': faults} if faults else {})
 
-    @property
-    def stride(self) -> float:
-        """Distance of the body in a gait cycle without slip, m."""
-        return self.gait.stride
-
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> Scene:
         """Read ``config/scenes/<name>.yaml``, or the file at a path.

@@ -50,8 +50,8 @@ class Sole(FootState):
         Place of the ground below it, m, that moves up and down; None on even ground.
     ratio : float
         Present coefficient of friction.
-    pressure, limit : float
-        Gauge pressure in the pads, Pa, and force limit of the domes at that pressure, N.
+    pressure : float
+        Gauge pressure in the pads, Pa.
     cleared : bool
         Whether it left the ground in its present or last swing.
     """
@@ -59,7 +59,7 @@ class Sole(FootState):
     def __init__(self, film: Film, friction: Any, block: Any) -> None:
         super().__init__()
         self.film, self.friction, self.block = film, friction, block
-        self.ratio = self.pressure = self.limit = 0.0
+        self.ratio = self.pressure = 0.0
         self.cleared = True
 
 
@@ -137,7 +137,7 @@ class Soles:
             check_pressures(pressures, len(self._soles))
             self._pressures = list(pressures)
             for sole, pressure in zip(self._soles, pressures, strict=True):
-                sole.pressure, sole.limit = pressure, self.foot.dome_load(math.inf, pressure)
+                sole.pressure = pressure
 
     def place(self, places: Sequence[Sequence[float]]) -> float:
         """Place the soles, flat and without load; return the height of the highest ground, m."""
@@ -168,14 +168,8 @@ class Soles:
 
     def press(self, sole: Sole, load: float, drained: float) -> None:
         """Set the friction of a foot with a load, N, whose film has drained for a time, s."""
-        pressure, limit = sole.pressure, sole.limit
-        dome_load = load if load < limit else limit
-        sole_load = load - dome_load
-        under_domes = under_sole = 0.0
-        if sole.wet:
-            under_domes, under_sole = sole.film.drain(dome_load, sole_load, pressure, drained)
-        grip = self.foot.resistance_of(dome_load, sole_load, pressure, under_domes, under_sole)
-        sole.ratio = ratio = grip / load
+        film = sole.film if sole.wet else None
+        sole.ratio = ratio = self.foot.grip(load, sole.pressure, film, drained) / load
         row = sole.friction
         # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.
         row[0] = row[1] = ratio
@@ -212,7 +206,7 @@ class Soles:
                 if math.hypot(distance, self.lever * turn) > SLIP_SPEED * dt:
                     lost = pushes_x[index] * step_x + pushes_y[index] * step_y
                     self.dissipation -= lost + moments[index] * turn
-            if sole.pressure > 0.0 and sole.limit < load:
+            if sole.pressure > 0.0 and self.foot.dome_load(load, sole.pressure) < load:
                 sole.overload_time += dt
 
     def _approach(self, sole: Sole, x: float, y: float, z: float) -> None:

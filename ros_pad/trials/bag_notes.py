@@ -148,7 +148,7 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
     return {
         'foot': scene.foot.source,
         'expected_load': scene.expected_load,
-        'stride_m': scene.stride,
+        'stride_m': scene.gait.stride,
         'cycle_s': scene.gait.cycle,
         'settle_s': scene.settle,
         'sensing': sensing,

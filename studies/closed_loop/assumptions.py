@@ -285,8 +285,8 @@ def _walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     if setup.limit_error != 1.0:
         # The table of force limits is scaled in a copy of the foot that only the simulation uses.
         foot = replace(world.foot)
-        table = tuple(setup.limit_error * limit for limit in foot._limit_table)
-        object.__setattr__(foot, '_limit_table', table)
+        limits = tuple(setup.limit_error * limit for limit in foot.limits)
+        object.__setattr__(foot, 'limits', limits)
         world = replace(world, foot=foot)
     loop = ClosedLoop(world, policy, seed, LEVEL)
     load = configured.expected_load * setup.load_error

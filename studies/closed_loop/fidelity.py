@@ -89,7 +89,7 @@ def errors(scene: Scene, found: dict[str, Walk]) -> dict[str, float]:
             if reference is None:
                 result[f'{name} {metric}'] = math.inf
                 continue
-            least = share * scene.stride * scene.cycles
+            least = share * scene.gait.stride * scene.cycles
             off = abs(walk[place] - reference[place])
             result[f'{name} {metric}'] = off / max(abs(reference[place]), least)
     return result

@@ -171,8 +171,8 @@ def _walks() -> tuple[Claim, ...]:
         film, shares = Film(own), []
         for pressure in WALKED:
             film.touch_down(FILM)
-            film.drain(LOAD, 0.0, pressure, 0.5)
-            shares.append(math.exp(-((film.under_domes / own.critical_film) ** own.film_exponent)))
+            under, _ = film.drain(LOAD, 0.0, pressure, 0.5)
+            shares.append(math.exp(-((under / own.critical_film) ** own.film_exponent)))
         dry[name] = np.array(shares)
     radius, water = foot.pad.radius, WATER.surface_tension
     pinned = hysteresis_force(radius, water, math.pi, 0.0) / foot.friction

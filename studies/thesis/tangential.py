@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ros_pad.contact import laws
 from ros_pad.contact.design import DESIGN_WATER
 from ros_pad.contact.dome import press
 from ros_pad.contact.film import Film
@@ -79,23 +80,23 @@ def slip_force(foot: Foot, setup: Any, load: float, pressure: float, wet: bool) 
         Whether there is liquid on the ground.
     """
     domes, sole = (load, 0.0) if pressure > 0.0 else (0.0, load)
-    dry = foot.resistance_of(domes, sole, pressure, 0.0, 0.0)
+    dry = laws.resistance(foot, domes, sole, pressure, 0.0, 0.0)
     if not wet:
         return dry
     film = Film(foot, setup.viscosity)
     film.touch_down(setup.film_thickness)
-    film.drain(domes, sole, pressure, setup.dwell)
+    films = film.drain(domes, sole, pressure, setup.dwell)
     step = dry / _STEPS
     pull, last = 0.0, 0.0
     while True:
-        held = foot.resistance_of(domes, sole, pressure, film.under_domes, film.under_sole)
+        held = laws.resistance(foot, domes, sole, pressure, *films)
         if pull >= held:
             # Interpolate linearly between two steps.
             back = (pull - held) / (pull - held + last) if pull else 0.0
             return pull - back * step
         last = held - pull
         pull += step
-        film.drain(domes, sole, pressure, step / (foot.shear_stiffness * setup.speed))
+        films = film.drain(domes, sole, pressure, step / (foot.shear_stiffness * setup.speed))
 
 
 def compute(scene: BenchScene) -> BenchTrial:

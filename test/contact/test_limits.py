@@ -156,3 +156,9 @@ def test_a_pad_with_measurements_of_its_own():
     plain = Pad(2e-3, 60.0)
     for criterion in OF_ANY_CAP:
         assert force_limit(own, 70e3, criterion) == force_limit(plain, 70e3, criterion)
+
+
+def test_no_limit_was_measured_on_rubber_as_stiff_as_the_large_pad():
+    rubber = Pad.of(Material('neo_hookean', (100e3,)), LARGE_PAD.radius, 0.4e-3)
+    assert rubber.stiffness == pytest.approx(LARGE_PAD.stiffness, rel=1e-12)
+    assert 'measured' in criteria(LARGE_PAD) and 'measured' not in criteria(rubber)

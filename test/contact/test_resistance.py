@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from ros_pad import configuration
-from ros_pad.contact import LARGE_PAD, MeasuredLimit
+from ros_pad.contact import LARGE_PAD, MeasuredLimit, force_limit
 from ros_pad.contact.resistance import Foot, tangential_resistance
 from ros_pad.errors import ConfigError, InvalidInput
 
@@ -71,6 +71,12 @@ def test_domes_past_their_limit():
     # At 20 N the sole touches wherever the domes do not: their area is no more than the sole.
     expected = 0.4 * 20.0 + 5000.0 * math.pi * 1e-4
     assert tangential_resistance(bare_foot(), 20.0, 65e3) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize('pressure', [71.1e3, 75.3e3, 89.9e3])
+def test_domes_between_tabulated_limits(pressure):
+    limit = 20 * force_limit(LARGE_PAD, pressure)
+    assert bare_foot(limit='thickness').dome_load(1e3, pressure) == pytest.approx(limit, rel=5e-5)
 
 
 def test_film_leaves_a_share_of_dry_contact():

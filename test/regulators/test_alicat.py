@@ -191,7 +191,7 @@ def test_bad_options_name_value_and_range(name, value, allowed):
 
 
 def test_pressure_follows_and_vents(emulated, opened, until):
-    _, line = emulated('alicat', time_constant=0.02)
+    _, line = emulated('alicat')
     regulator = opened('alicat', port=line.path)
     regulator.set_pressure(75e3)
     until(lambda: abs(regulator.read().pressure - 75e3) < 100.0)

@@ -18,7 +18,7 @@ from ros_pad.regulators.emulate import (
 def test_pressure_follows_with_one_time_constant(monkeypatch):
     now = 100.0
     monkeypatch.setattr(time, 'monotonic', lambda: now)
-    valve = Valve(time_constant=0.1)
+    valve = Valve()
     valve.follow(50e3)
     now += 0.1
     assert valve.pressure == pytest.approx(50e3 * 0.6321206)
@@ -78,8 +78,9 @@ def test_a_link_that_was_replaced_is_kept(other, until, tmp_path):
     assert os.path.lexists(link) == (other != 'nothing')
 
 
-def test_replies_of_an_alicat():
-    device = AlicatEmulator('AB', time_constant=1e-6)
+def test_replies_of_an_alicat(monkeypatch):
+    monkeypatch.setattr(Valve, 'TIME_CONSTANT', 1e-6)
+    device = AlicatEmulator('AB')
 
     def reply(command):
         return device.answer(command)

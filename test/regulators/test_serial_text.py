@@ -94,7 +94,7 @@ def test_a_setpoint_that_is_not_in_force_is_a_fault(emulated, opened, until, kin
 
 
 def test_six_channels_share_a_port(emulated, opened, until):
-    _, line = emulated('serial_text', time_constant=0.02)
+    _, line = emulated('serial_text')
     feet = [opened('serial_text', port=line.path, channel=each + 1) for each in range(6)]
     for number, foot in enumerate(feet):
         foot.set_pressure(10e3 * (number + 1))

@@ -29,7 +29,7 @@ def threads():
 
 
 def test_regulators_on_one_bus_share_port_and_thread(emulated, opened, until):
-    _, line = emulated('alicat', unit_ids='ABCDEF', time_constant=0.02)
+    _, line = emulated('alicat', unit_ids='ABCDEF')
     feet = [opened('alicat', port=line.path, unit_id=each) for each in 'ABCDEF']
     assert len(threads()) == 1
     for number, foot in enumerate(feet):

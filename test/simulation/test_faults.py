@@ -220,7 +220,7 @@ BAD = [
     ('{kind: silence, legs: [9]}', 'legs = [9] is not allowed: a list of different whole'),
     ('{kind: silence, offset: 1.0}', "unknown key 'offset'"),
     ('{kind: sensor_drift, offset: 2e5}', 'a number from -100000 to 100000 Pa is needed'),
-    ('{kind: supply_loss, pressure: -1}', 'pressure = -1.0 is not allowed: a number from 0 to'),
+    ('{kind: supply_loss, pressure: -1}', 'pressure = -1 is not allowed: a number from 0 to'),
     ('silence', "expected a table of keys, found 'silence'"),
 ]
 

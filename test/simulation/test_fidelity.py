@@ -92,7 +92,7 @@ def test_no_promise_outside_the_ranges_drawn(name):
         assert f'{key} = {beyond:.4g}, drawn from {low:.4g} to {high:.4g}' in choice.note
     foot = {key.name: getattr(scene.foot, key.name) for key in dataclasses.fields(scene.foot)}
     numbers = {f'foot.{key}' for key, value in foot.items() if isinstance(value, (int, float))}
-    assert numbers - {'foot._limit_cell'} <= ranges.keys()
+    assert numbers - {'foot.limit_cell'} <= ranges.keys()
 
 
 def test_no_promise_with_what_was_not_drawn():

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The planar step has the physics of gait, foot, film and floor; compiled, it is bit-identical."""
 
-import dataclasses
 import itertools
 import math
 
@@ -10,8 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_pad.contact import Foot
-from ros_pad.contact.film import Film
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation import Scene, compiled, planar_step
 from ros_pad.simulation.gait import WalkingGait
@@ -57,44 +54,6 @@ def test_gait(time, cycle, duty, stride):
             assert feet[planar_step.OFFSET_X][index] == pytest.approx(
                 progress * gait.reach(), abs=1e-15
             )
-
-
-@given(
-    st.floats(0.0, 40.0),
-    st.floats(0.0, 90e3),
-    st.sampled_from(['large37', 'large19']),
-    st.floats(1e-8, 1e-3),
-    st.floats(0.0, 1e-3),
-)
-def test_foot(load, pressure, name, dome_film, sole_film):
-    foot = dataclasses.replace(Foot.load(name), capillary_force=2e-4)
-    own = model_of(dataclasses.replace(SCENE, foot=foot), FLOOR, 0.004)
-    on_domes = foot.dome_load(load, pressure)
-    assert planar_step.dome_load(own, load, pressure) == on_domes
-    films = on_domes, load - on_domes, pressure, dome_film, sole_film
-    assert planar_step.resistance(own, *films) == foot.resistance_of(*films)
-
-
-@given(
-    st.lists(
-        st.tuples(st.just(0.0) | st.floats(1e-6, 20.0), st.floats(0.0, 90e3)),
-        min_size=1,
-        max_size=30,
-    ),
-    st.sampled_from([0.0, 1e-5, 3e-4]),
-)
-def test_film(presses, depth):
-    film, feet = Film(SCENE.foot, SCENE.floor.viscosity), table()
-    film.touch_down(depth)
-    fresh = depth**-2 if depth else math.inf
-    for row in (planar_step.FRESH, planar_step.DOME_FILM, planar_step.SOLE_FILM):
-        feet[row][2] = fresh
-    for load, pressure in presses:
-        on_domes = SCENE.foot.dome_load(load, pressure)
-        film.drain(on_domes, load - on_domes, pressure, MODEL.period)
-        planar_step.drain(MODEL, feet, 2, on_domes, load - on_domes, pressure)
-        assert feet[planar_step.DOME_FILM][2] ** -0.5 == film.under_domes
-        assert feet[planar_step.SOLE_FILM][2] ** -0.5 == pytest.approx(film.under_sole, rel=1e-14)
 
 
 @given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))

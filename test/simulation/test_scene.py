@@ -75,14 +75,14 @@ def test_values_come_where_they_belong():
     scene = Scene.load('hexapod_patches')
     assert scene.body.mass == 2.09
     assert scene.expected_load == pytest.approx(scene.body.mass * 9.81 / 3.0)
-    assert scene.stride == scene.gait.stride == HEXAPOD['gait']['stride']
+    assert scene.gait.stride == HEXAPOD['gait']['stride']
     assert scene.tow.friction_dry == HEXAPOD['tow']['friction_dry']
     assert scene.tow.friction_wet == HEXAPOD['tow']['friction_wet']
     assert scene.sensors.rate == HEXAPOD['sensors']['rate']
     assert scene.sensors.position == HEXAPOD['sensors']['position_noise']
     leg = Scene.load('leg_wet_dome_60')
     assert leg.dome_pressure == LEG['dome_pressure']
-    assert leg.stride == LEG['gait']['stroke'] and leg.expected_load == LEG['body']['load']
+    assert leg.gait.stride == LEG['gait']['stroke'] and leg.expected_load == LEG['body']['load']
     assert leg.heading_gain == 0.0 and leg.tow.weight == 0.0
 
 

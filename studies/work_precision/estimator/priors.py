@@ -126,7 +126,7 @@ def on_ground(condition: Condition, seed: int) -> Callable[[ClosedLoop], None]:
         def changed(sole: Sole, load: float, drained: float) -> None:
             press(sole, load, drained)
             flat = condition.wet if sole.wet else condition.dry
-            domed = min(1.0, sole.limit / load)
+            domed = soles.foot.dome_load(load, sole.pressure) / load
             x, y, _ = soles._places[soles._soles.index(sole)]
             place = places[int((y + 4.0) // CELL) % shape[0], int((x + 1.0) // CELL) % shape[1]]
             factor = float(place) * (domed * condition.dome + (1.0 - domed) * flat)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.contact import laws
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError, InvalidInput
@@ -260,7 +261,7 @@ class DrakeRobot:
         films = (0.0, 0.0)
         if self.feet[index].wet:
             films = self._films[index].drain(on_domes, load - on_domes, pressure, drained)
-        return self._foot.resistance_of(on_domes, load - on_domes, pressure, *films) / load
+        return laws.resistance(self._foot, on_domes, load - on_domes, pressure, *films) / load
 
     def _push(self) -> None:
         """Set the forces of line and bristles for the next step."""

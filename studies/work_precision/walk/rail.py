@@ -11,6 +11,7 @@ from typing import Any
 
 from scipy.integrate import solve_ivp
 
+from ros_pad.contact import laws
 from ros_pad.contact.film import Film
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import RailBody, RailGait, Scene
@@ -69,18 +70,18 @@ def cap_in_stance(case: Walk) -> Callable[[float], float]:
     domes = foot.dome_load(scene.body.load, case.pressure)
     sole = scene.body.load - domes
     if scene.floor.kind == 'dry':
-        dry = foot.resistance_of(domes, sole, case.pressure, 0.0, 0.0)
+        dry = laws.resistance(foot, domes, sole, case.pressure, 0.0, 0.0)
         return lambda _: dry
     # 1/h² of a film thickness h grows at a constant rate.
     film = Film(foot, scene.floor.viscosity)
     film.touch_down(scene.floor.film_thickness)
     fresh = scene.floor.film_thickness**-2
-    film.drain(domes, sole, case.pressure, 1.0)
-    dome_rate, sole_rate = film.under_domes**-2 - fresh, film.under_sole**-2 - fresh
+    drained = film.drain(domes, sole, case.pressure, 1.0)
+    dome_rate, sole_rate = (thickness**-2 - fresh for thickness in drained)
 
     def cap(since: float) -> float:
         films = (fresh + dome_rate * since) ** -0.5, (fresh + sole_rate * since) ** -0.5
-        return foot.resistance_of(domes, sole, case.pressure, *films)
+        return laws.resistance(foot, domes, sole, case.pressure, *films)
 
     return cap
 

@@ -86,7 +86,7 @@ def _result(
     here = went[walker.name]
     truth = [_between(*pair) for pair in zip(went[tops[0]], went[tops[-1]], strict=True)]
     durations = [walk.scene.duration for walk in walks]
-    least = [LEAST * walk.scene.stride for walk in walks]
+    least = [LEAST * walk.scene.gait.stride for walk in walks]
     valid = [not each.verdict and math.isfinite(each.distance) for each in here]
     off = {
         measure: np.array(

@@ -52,7 +52,7 @@ def went(distance, slip, seconds, lateral=0.0, yaw=0.0, verdict=None):
 def test_errors_failures_and_ratios():
     scene = replace(Scene.load('hexapod_smooth_dry_flat'), settle=0.0, cycles=5)  # 5 s
     walks = [Walk(f'{number}', scene, 0.0) for number in range(4)]
-    least = results.LEAST * scene.stride
+    least = results.LEAST * scene.gait.stride
     top = fake('top', [
         went(0.1, 0.02, 4.0), went(0.1, 0.02, 4.0, 1e-3, -2e-3), went(0.1, 0.0, 8.0),
         went(0.1, 0.02, 4.0),
