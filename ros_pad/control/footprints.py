@@ -10,10 +10,10 @@ import math
 from collections import deque
 
 from ros_pad.contact.resistance import Foot, expected_friction
-from ros_pad.estimation import Tuning
 
-WET_PRIOR = Tuning.wet_prior
-"""Prior probability P0 of wet ground."""
+WET_PRIOR = 0.5
+"""Prior probability P0 of wet ground where no foot has stood: no opinion, whatever the estimator's
+setting ``wet_prior``."""
 
 FADING_LENGTH = 1.0
 """Distance ℓ over which footprints fade, m."""

@@ -206,9 +206,10 @@ def oracle(is_wet: IsWet) -> Policy:
 def first_morphologies(policy: str, legs: Sequence[int]) -> dict[int, str]:
     """Return the morphology that each leg starts with under a policy.
 
-    With the adaptive policy the first and the last leg, one of each tripod, start flat to measure
-    the ground; the others start as domes. On an unknown floor, six flat feet lose more on wet
-    ground than six domes on dry ground, and two flat feet are enough to estimate the ground.
+    With the adaptive policy the first and the last leg start flat to measure the ground; the
+    others start as domes. Of a hexapod these are one of each tripod, of a quadruped one diagonal.
+    On an unknown floor, six flat feet lose more on wet ground than six domes on dry ground, and
+    two flat feet are enough to estimate the ground.
 
     Parameters
     ----------

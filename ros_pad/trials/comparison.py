@@ -117,7 +117,8 @@ class Comparison:
     largest_difference : float
         Largest difference of two numbers, in that unit; inf if only one of them is NaN.
     first_difference_s : float or None
-        Time of the first record that differs or is missing, s after the beginning of the bag.
+        Time of the first record that differs by more than rounding or is missing, s after the
+        beginning of the bag.
     verdict : str
         ``equal``; ``rounding``: no record is missing, and no difference is larger than
         :data:`ROUNDING`; ``gap``: all larger differences and missing records come after a gap in
@@ -168,12 +169,11 @@ def compare(
         for field in recorded.kind.fields:
             key = leg, field.name
             apart, far = _apart(before[key].values[own], after[key].values[theirs])
-            parting = np.concatenate([recorded.times[own][apart > 0.0], lost])
             grave = np.concatenate([recorded.times[own][far], lost])
-            verdict = 'rounding' if len(parting) else 'equal'
+            verdict = 'rounding' if apart.any() else 'equal'
             if len(grave):
                 verdict = 'gap' if grave.min() >= gap_ns else 'different'
-            first = (int(parting.min()) - start_ns) * 1e-9 if len(parting) else None
+            first = (int(grave.min()) - start_ns) * 1e-9 if len(grave) else None
             found.append(
                 Comparison(
                     topic=topic,

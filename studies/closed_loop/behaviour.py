@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare the metrics of every scene and of a replay before and after a change of the code.
 
-Runs every shipped scene without ROS, with seed 3 (``pad run``), and replays the shipped bag (``pad
-replay``). Writes behaviour.json with all numbers in SI units, without texts and the speed of the
-run. With ``--against FILE``, it lists every number that differs from an older file, and the exit
-status is 1 if there are differences. Compare only files from one machine and one set of packages.
+Runs every shipped scene without ROS, walks with seed 3 (``pad run``), and replays the shipped bag
+(``pad replay``). Writes behaviour.json with all numbers in SI units, without texts and the speed
+of the run. With ``--against FILE``, it lists every number that differs from an older file, and the
+exit status is 1 if there are differences. Compare only files from one machine and one set of
+packages.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pathlib
 import subprocess
@@ -18,6 +20,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ros_pad.errors import PadError
+from ros_pad.simulation.fidelity import answer
+from ros_pad.simulation.scene import Scene
 from studies import command
 
 SCENES = sorted(path.stem for path in command.ROOT.glob('config/scenes/*.yaml'))
@@ -35,10 +39,17 @@ def behaviour(case: str, cycles: int | None) -> Any:
         When ``pad`` prints nothing, or ends with another status than 0 or 1.
     """
     words = ['replay', str(BAG)] if case == REPLAY else ['run', case]
-    if case != REPLAY and not case.startswith('bench_'):
-        words += [*OPTIONS, *(('--cycles', str(cycles)) if cycles else ())]
     with tempfile.TemporaryDirectory() as folder:
-        words += ['--json', '--out', str(pathlib.Path(folder) / 'out')]
+        out = ['--out', str(pathlib.Path(folder) / 'out')]
+        if case != REPLAY and not case.startswith('bench_'):
+            scene = Scene.load(case)
+            scene = dataclasses.replace(scene, cycles=cycles or scene.cycles)
+            if answer(scene, scene.policy):
+                out = []  # nothing is simulated, so seed and folder are refused
+            else:
+                words += OPTIONS
+            words += ['--cycles', str(scene.cycles)]
+        words += ['--json', *out]
         found = subprocess.run(
             [sys.executable, '-m', 'ros_pad', *words],
             capture_output=True, text=True, cwd=command.ROOT,

@@ -465,8 +465,14 @@ def test_numbers_are_compared_to_the_bit():
     found = compared(stream((20, 0.5), (40, 0.5)), stream((20, 0.5), (40, 0.75)), start_ns=10 * MS)
     assert (found.equal, found.largest_difference) == (1, 0.25)
     assert found.first_difference_s == pytest.approx(0.030)
-    found = compared(stream((20, 0.5)), stream((20, np.nextafter(0.5, 1.0))))
-    assert (found.equal, found.verdict) == (0, 'rounding')
+    rounded = np.nextafter(0.5, 1.0)
+    found = compared(stream((20, 0.5)), stream((20, rounded)))
+    assert (found.equal, found.verdict, found.first_difference_s) == (0, 'rounding', None)
+    # Rounding before a gap is not its first difference.
+    found = compared(
+        stream((20, 0.5), (40, 0.5)), stream((20, rounded), (40, 1.0)), gap_ns=30 * MS
+    )
+    assert (found.verdict, found.first_difference_s) == ('gap', pytest.approx(0.040))
     assert compared(stream((20, 0.5)), stream((20, 0.5 + 1e-11))).verdict == 'different'
 
 
