@@ -24,7 +24,8 @@ os.environ.setdefault('ROS_LOG_DIR', tempfile.mkdtemp(prefix='ros_pad_log_'))
 
 rclpy = pytest.importorskip('rclpy', reason='the node tests need ROS 2')
 
-from helpers import Bench, wait_for  # noqa: E402
+from helpers import Bench  # noqa: E402
+from shared import wait_for  # noqa: E402
 
 Until = Callable[..., None]
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
-import time
 from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
@@ -23,11 +22,8 @@ from std_msgs.msg import Header
 from ros_pad.bags import topics
 from ros_pad.bags.topics import Topic
 from ros_pad.bags.wire import Wire, legs_of
-from ros_pad.errors import TransportError
 from ros_pad.nodes.qos import message_class
 from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind, split
-from ros_pad.regulators import Reading
-from ros_pad.regulators.protocol import permitted
 
 MS = 1_000_000
 SECOND = 1_000 * MS
@@ -39,15 +35,6 @@ NODES = (
 )  # fmt: skip
 LOAD = 6.83
 """Load of a foot in stance, N."""
-
-
-def wait_for(condition, what='the condition', turn=lambda: time.sleep(0.01), seconds=60.0):
-    """Call ``turn`` until a condition holds, and return what it is; fail after some seconds."""
-    deadline = time.monotonic() + seconds
-    while not (found := condition()):
-        assert time.monotonic() < deadline, f'waited for {what}: timeout after {seconds:g} s'
-        turn()
-    return found
 
 
 def start_node(name: str, *parameters: str) -> subprocess.Popen[str]:
@@ -144,45 +131,6 @@ def deliver(node: Node, name: str, data: bytes) -> None:
     assert found, f'{node.get_name()} does not subscribe to {name}'
     for each in found:
         each.callback(data if each.raw else deserialize_message(data, each.msg_type))
-
-
-class Device:
-    """A device that keeps what it received; its cable may break."""
-
-    made: tuple[Device, ...] = ()
-
-    def __init__(self, ceiling, port='usb', clock=None, pad_volume=0.0):
-        self.ceiling, self.port = ceiling, port
-        self.setpoint, self.received = 40e3, []  # of an earlier user
-        self.is_open = False
-        self.broken = None  # error with which its answers are lost
-        Device.made = (*Device.made, self)
-
-    def open(self):
-        if self.port == 'none':
-            raise TransportError("no such port: 'none'")
-        self.is_open = True
-
-    def set_pressure(self, gauge_pa):
-        self.received.append(gauge_pa)
-        self.setpoint = permitted(gauge_pa, self.ceiling)
-        self._answer()
-
-    def read(self):
-        self._answer()
-        return Reading(self.setpoint, self.setpoint, (), 0.0)
-
-    def vent(self):
-        self._answer()
-        self.setpoint = 0.0
-
-    def close(self):
-        self.is_open = False
-
-    def _answer(self):
-        assert self.is_open
-        if self.broken:
-            raise self.broken
 
 
 class Bench:

@@ -9,13 +9,14 @@ import re
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import MS, SECOND, Device, command, overrides
+from helpers import MS, SECOND, command, overrides
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import SetParameters
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from shared import Device
 from std_srvs.srv import Trigger
 
 from ros_pad import configuration

@@ -8,28 +8,18 @@ import select
 import struct
 import termios
 import threading
-import time
 import tty
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from shared import wait_for
 
 from ros_pad.errors import PadError
 from ros_pad.regulators import Regulator, create
 from ros_pad.regulators.emulate import EMULATORS, Emulator
 
-LIMIT = 60.0  # s, enough on slow machines
 PATIENT = {'reply_timeout': 1.0, 'silence': 5.0}  # s: slow machines must not lose devices
-
-
-def wait_until(condition: Callable[[], Any], limit: float = LIMIT) -> Any:
-    """Call a function until its result is true, and return this result."""
-    end = time.monotonic() + limit
-    while not (found := condition()):
-        assert time.monotonic() < end, f'the condition is not true within {limit} s'
-        time.sleep(0.002)
-    return found
 
 
 class Dialogue:
@@ -143,4 +133,4 @@ def opened() -> Iterator[Callable[..., Regulator]]:
 
 @pytest.fixture
 def until() -> Callable[..., Any]:
-    return wait_until
+    return wait_for

@@ -93,19 +93,6 @@ def test_a_setpoint_that_is_not_in_force_is_a_fault(emulated, opened, until, kin
     assert regulator.read().faults == ()
 
 
-def test_six_channels_share_a_port(emulated, opened, until):
-    _, line = emulated('serial_text', time_constant=0.02)
-    feet = [opened('serial_text', port=line.path, channel=each + 1) for each in range(6)]
-    for number, foot in enumerate(feet):
-        foot.set_pressure(10e3 * (number + 1))
-    wanted = [10e3 * (number + 1) for number in range(6)]
-    until(lambda: abs(feet[-1].read().pressure - wanted[-1]) < 100.0)
-    until(lambda: all(foot.read().setpoint == at for foot, at in zip(feet, wanted, strict=True)))
-    # Each channel has its own pressure; the resolution of the board is 20 Pa.
-    until(lambda: abs(feet[0].read().pressure - wanted[0]) < 100.0)
-    assert [foot.read().pressure for foot in feet] == pytest.approx(wanted, abs=500.0)
-
-
 @pytest.mark.parametrize(
     ('options', 'words'),
     [
