@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Public functions refuse bad arguments with an error that names the argument and its value."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -22,7 +19,7 @@ RAIL_LEG = simulation.Scene.load('leg_wet_flat')
 CONTROLLER = control.MorphologyController(FOOT, [1], control.flat, 5.0)
 
 
-def sample(**bad: Any) -> sensing.BodyEstimate:
+def sample(**bad):
     """Give an estimator one sample."""
     joints = ROBOT.home.ravel()
     good = {
@@ -70,7 +67,7 @@ CASES = (
 
 
 @pytest.mark.parametrize(('function', 'arguments', 'bad'), CASES)
-def test_the_error_names_the_argument(function: Callable, arguments: tuple, bad: Any):
+def test_the_error_names_the_argument(function, arguments, bad):
     named = bad if isinstance(bad, dict) else {}
     name = list(named)[-1] if named else bad
     with pytest.raises(InvalidInput, match=rf'^{name}\b.* needed'):

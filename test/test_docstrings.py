@@ -25,21 +25,21 @@ CHECKS = {'quantity', 'number', 'integer', 'text', 'choice', 'instance'}
 """Functions of ros_pad.configuration, which raise InvalidInput."""
 
 
-def names_of(package: str) -> list[str]:
+def names_of(package):
     """Return the public names of a package."""
     module = importlib.import_module(package)
     classes = [name for name, each in vars(module).items() if isinstance(each, type)]
     return getattr(module, '__all__', classes)
 
 
-def function_of(member: object) -> object:
+def function_of(member):
     """Return the function of a property or method."""
     for name in ('fget', 'func', '__func__'):
         member = getattr(member, name, None) or member
     return member
 
 
-def documented() -> dict[str, object]:
+def documented():
     """Return public classes and functions, public methods and properties, by full name."""
     found = {}
     for package in PACKAGES:
@@ -56,13 +56,13 @@ def documented() -> dict[str, object]:
 DOCUMENTED = documented()
 
 
-def sections(text: str) -> dict[str, str]:
+def sections(text):
     """Return the text of each section of a NumPy docstring; '' is what is before the first."""
     parts = ['', *re.split(r'(?m)^(\w+)\n-{3,}$', inspect.cleandoc(text))]
     return dict(zip(parts[::2], parts[1::2], strict=True))
 
 
-def entries(section: str) -> dict[str, tuple[str, str]]:
+def entries(section):
     """Return type and description of each name in a section."""
     found = {}
     for entry in re.findall(r'(?m)^\S.*(?:\n(?: .*)?)*', section):
@@ -72,13 +72,13 @@ def entries(section: str) -> dict[str, tuple[str, str]]:
     return found
 
 
-def unit_missing(kind: str, text: str) -> bool:
+def unit_missing(kind, text):
     """Return whether a number of this type is described without unit."""
     numbers = re.search(r'float|array(?! of (int|str|bool)|\[np.bool)', kind)
     return bool(numbers) and not UNIT.search(text)
 
 
-def parameters(of: object) -> set[str]:
+def parameters(of):
     """Return the names of the parameters of a function or class; none of errors and protocols."""
     if inspect.isclass(of) and (issubclass(of, Exception) or getattr(of, '_is_protocol', False)):
         return set()
@@ -86,7 +86,7 @@ def parameters(of: object) -> set[str]:
     return {name for name in names if name not in ('self', 'cls') and not name.startswith('_')}
 
 
-def raised(of: object) -> set[str]:
+def raised(of):
     """Return the errors that a function raises itself."""
     found = set()
     for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(of)))):
@@ -98,7 +98,7 @@ def raised(of: object) -> set[str]:
     return found
 
 
-def faults(of: object) -> list[str]:
+def faults(of):
     """Return what is missing in the docstring of a class or function, or wrong."""
     if not of.__doc__:
         return ['no docstring']
@@ -123,5 +123,5 @@ def faults(of: object) -> list[str]:
 
 # A third of the names, another one for each number of names.
 @pytest.mark.parametrize('name', sorted(DOCUMENTED)[len(DOCUMENTED) % 3 :: 3])
-def test_the_docstring_is_complete(name: str):
+def test_the_docstring_is_complete(name):
     assert not faults(DOCUMENTED[name])

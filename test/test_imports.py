@@ -37,27 +37,27 @@ WORDS = {'rclpy and the messages': ROS, 'matplotlib': {'matplotlib', 'mpl_toolki
 
 
 @functools.cache
-def allowed(part: str) -> frozenset[str]:
+def allowed(part):
     """Return the parts that a part may import: those of its row, and all that these may import."""
     direct = TABLE[part].get('imports', [])
     return frozenset({*direct, *(each for other in direct for each in allowed(other))})
 
 
-def libraries(part: str, key: str) -> set[str]:
+def libraries(part, key):
     """Return the packages of other projects in one column of a part's row."""
     return {name for word in TABLE[part].get(key, []) for name in WORDS.get(word, {word})}
 
 
-def files(part: str) -> list[pathlib.Path]:
+def files(part):
     """Return the source files of a part, which is one module or one package."""
     return [*SOURCE.glob(f'{part}.py'), *SOURCE.glob(f'{part}/**/*.py')]
 
 
-def imports(path: pathlib.Path) -> set[tuple[str, bool]]:
+def imports(path):
     """Return (dotted name, inside a function) of all imports in a file."""
     found = set()
 
-    def visit(node: ast.AST, inside: bool) -> None:
+    def visit(node, inside):
         inside |= isinstance(node, ast.FunctionDef)
         if isinstance(node, ast.Import):
             found.update((alias.name, inside) for alias in node.names)
@@ -80,7 +80,7 @@ def test_the_table_has_every_part_and_every_part_imports_what_is_below_it():
 
 
 @pytest.mark.parametrize('part', TABLE)
-def test_imports_run_down(part: str):
+def test_imports_run_down(part):
     paths = files(part)
     assert paths
     used = set()

@@ -23,7 +23,7 @@ DRIVERS = ('body_estimator_node', 'merge_node', 'views_node')
 """Nodes that a simulated walk with markers does not need."""
 
 
-def assigned(tree: ast.Module, name: str) -> object:
+def assigned(tree, name):
     """Return the value of a literal that is assigned to a name at the top of a module."""
     (value,) = (
         each.value
@@ -34,11 +34,11 @@ def assigned(tree: ast.Module, name: str) -> object:
 
 
 @pytest.fixture(scope='module')
-def tree() -> ast.Module:
+def tree():
     return ast.parse(FILE.read_text(encoding='utf-8'))
 
 
-def first_arguments(tree: ast.Module, function: str) -> set[str]:
+def first_arguments(tree, function):
     """Return the first argument of each call of a function if it is a literal."""
     return {
         call.args[0].value
@@ -49,13 +49,13 @@ def first_arguments(tree: ast.Module, function: str) -> set[str]:
     }
 
 
-def test_every_node_is_an_executable_of_the_package(tree: ast.Module):
+def test_every_node_is_an_executable_of_the_package(tree):
     setup = ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8'))
     executables = {f'{name}_node' for name in assigned(setup, 'NODES')}
     assert first_arguments(tree, 'node') == executables == set(NODES)
 
 
-def test_simulated_regulators_hear_of_the_scene_that_is_walked(tree: ast.Module):
+def test_simulated_regulators_hear_of_the_scene_that_is_walked(tree):
     scenes = {
         call.args[0].value: ast.unparse(keyword.value)
         for call in ast.walk(tree)
@@ -66,7 +66,7 @@ def test_simulated_regulators_hear_of_the_scene_that_is_walked(tree: ast.Module)
     assert scenes == {'regulator_node': 'scene', 'simulator_node': 'scene'}
 
 
-def test_every_argument_is_used_and_described_with_its_unit_or_kind(tree: ast.Module):
+def test_every_argument_is_used_and_described_with_its_unit_or_kind(tree):
     arguments = assigned(tree, 'ARGUMENTS')
     flags = first_arguments(tree, 'flag')
     assert flags | first_arguments(tree, 'text') == set(arguments)
@@ -88,7 +88,7 @@ def test_every_argument_is_used_and_described_with_its_unit_or_kind(tree: ast.Mo
     ],
     ids=['simulated', 'joints', 'merge', 'robot', 'robot with records', 'not recorded'],
 )
-def test_it_starts_the_nodes_that_are_asked_for(given: dict[str, str], missing: set[str]):
+def test_it_starts_the_nodes_that_are_asked_for(given, missing):
     pytest.importorskip('launch_ros', reason='launch is not installed')
     from launch import LaunchContext
     from launch.actions import OpaqueFunction

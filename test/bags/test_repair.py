@@ -29,7 +29,7 @@ from ros_pad.errors import BagError
 from ros_pad.trials.label import RECORDED_AT
 
 
-def data_in(folder: pathlib.Path, topic: str) -> list[float]:
+def data_in(folder, topic):
     return [message.data for _, message, _ in BagReader(folder).messages({topic})]
 
 
@@ -47,7 +47,7 @@ def trial(tmp_path):
     return folder
 
 
-def chunks(path: pathlib.Path):
+def chunks(path):
     with path.open('rb') as stream:
         return sorted(
             make_reader(stream).get_summary().chunk_indexes,
@@ -267,7 +267,7 @@ def test_any_cut_is_read_without_a_fall(trial, tmp_path):
 
 
 def test_an_error_of_the_callback_is_no_damage(trial, tmp_path):
-    def progress(share: float) -> None:
+    def progress(share):
         if 0.1 < share < 0.5:  # while the bag is read, before anything is written
             raise BrokenPipeError
 

@@ -73,23 +73,6 @@ def test_seeds_that_make_no_sense_are_refused(text):
         seeds(text)
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'parts'),
-    [
-        (['leg_wet_fla'], ["'leg_wet_fla'", "Did you mean 'leg_wet_flat'"]),
-        (['leg_wet_flat', '--workers', '0'], ['workers = 0 is not allowed']),
-    ],
-)
-def test_bad_input_is_refused_before_anything_runs(arguments, parts, tmp_path, capsys):
-    out = tmp_path / 'sweep'
-    assert cli.main(['sweep', *arguments, '--out', str(out)]) == 2
-    said = capsys.readouterr()
-    for part in parts:
-        assert part in said.err
-    assert said.out == ''
-    assert not out.exists()
-
-
 def nothing_to_do(jobs, workers):
     assert not jobs
     yield from ()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import gc
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
@@ -31,7 +31,7 @@ Until = Callable[..., None]
 
 
 @pytest.fixture
-def context() -> Iterator[rclpy.Context]:
+def context():
     context = rclpy.Context()
     rclpy.init(context=context)
     yield context
@@ -42,7 +42,7 @@ def context() -> Iterator[rclpy.Context]:
 
 
 @pytest.fixture
-def executor(context: rclpy.Context) -> Iterator[rclpy.executors.Executor]:
+def executor(context):
     from rclpy.executors import SingleThreadedExecutor
 
     executor = SingleThreadedExecutor(context=context)
@@ -53,10 +53,8 @@ def executor(context: rclpy.Context) -> Iterator[rclpy.executors.Executor]:
 
 
 @pytest.fixture
-def until(executor: rclpy.executors.Executor) -> Until:
-    def until(
-        predicate: Callable[[], object], timeout: float = 60.0, what: str = 'the condition'
-    ) -> None:
+def until(executor):
+    def until(predicate, timeout=60.0, what='the condition'):
         wait_for(predicate, what, lambda: executor.spin_once(timeout_sec=0.01), timeout)
 
     return until

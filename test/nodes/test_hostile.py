@@ -255,8 +255,8 @@ def test_no_sequence_of_messages_passes_the_ceiling_or_stops_the_timeout(rig):
         assert all(
             device.setpoint == 0.0 for device in Device.made if rig.node.supervision.channels
         )
-        rig.transit('configure')
-        rig.transit('activate')
+        for name in ('deactivate', 'configure', 'activate'):
+            rig.transit(name)
         if rig.time_ns < LAST_NS - SECOND:
             rig.tick(200 * MS)
             rig.send_now(30e3, NAN)

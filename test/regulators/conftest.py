@@ -9,8 +9,6 @@ import struct
 import termios
 import threading
 import tty
-from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
 from shared import wait_for
@@ -29,7 +27,7 @@ class Dialogue:
     read all replies.
     """
 
-    def __init__(self, script: list[tuple[str, str]], terminator: str = '\r') -> None:
+    def __init__(self, script, terminator='\r'):
         self._script = [(command + terminator, reply) for command, reply in script]
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
@@ -40,7 +38,7 @@ class Dialogue:
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
-    def _serve(self) -> None:
+    def _serve(self):
         received = ''
         while not self._closing:
             if not select.select([self._near], [], [], 0.01)[0]:
@@ -63,10 +61,10 @@ class Dialogue:
                     return
 
     @property
-    def over(self) -> bool:
+    def over(self):
         return self.sent == len(self._script) or bool(self.problems)
 
-    def close(self) -> None:
+    def close(self):
         self._closing = True
         self._thread.join()
         unread = struct.unpack('i', fcntl.ioctl(self._far, termios.FIONREAD, b'\0' * 4))[0]
@@ -79,11 +77,11 @@ class Dialogue:
 
 
 @pytest.fixture
-def dialogue() -> Iterator[Callable[..., Dialogue]]:
+def dialogue():
     """Return a function that makes a scripted device; its script must be complete at the end."""
     made: list[Dialogue] = []
 
-    def make(script: list[tuple[str, str]], terminator: str = '\r') -> Dialogue:
+    def make(script, terminator='\r'):
         made.append(Dialogue(script, terminator))
         return made[-1]
 
@@ -94,17 +92,17 @@ def dialogue() -> Iterator[Callable[..., Dialogue]]:
 
 
 @pytest.fixture
-def mute() -> Callable[..., Dialogue]:
+def mute():
     """Return a function that makes a scripted device, whose end the test itself checks."""
     return Dialogue
 
 
 @pytest.fixture
-def emulated() -> Iterator[Callable[..., Any]]:
+def emulated():
     """Return a function that makes an emulated device on a port: (device, emulator)."""
     made: list[Emulator] = []
 
-    def make(name: str, link: str | None = None, **options: Any) -> tuple[Any, Emulator]:
+    def make(name, link=None, **options):
         device = EMULATORS[name](**options)
         made.append(Emulator(device, link))
         return device, made[-1]
@@ -115,11 +113,11 @@ def emulated() -> Iterator[Callable[..., Any]]:
 
 
 @pytest.fixture
-def opened() -> Iterator[Callable[..., Regulator]]:
+def opened():
     """Return a function that opens a regulator, which is closed at the end of the test."""
     made: list[Regulator] = []
 
-    def make(backend: str, **options: Any) -> Regulator:
+    def make(backend, **options):
         regulator = create(backend, **(PATIENT | options))
         made.append(regulator)
         regulator.open()
@@ -132,5 +130,5 @@ def opened() -> Iterator[Callable[..., Regulator]]:
 
 
 @pytest.fixture
-def until() -> Callable[..., Any]:
+def until():
     return wait_for

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import pathlib
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from studies.__main__ import main
 from studies.closed_loop import labelled_contacts as contacts
 
 
-def foot(label: list[int], load: float | np.ndarray = 10.0, **columns: object):
+def foot(label, load=10.0, **columns):
     """Return a recording of a foot with labels; it has no load at label 1, no contact."""
     label = np.array(label)
     empty = np.zeros((len(label), 3))
@@ -28,7 +27,7 @@ def foot(label: list[int], load: float | np.ndarray = 10.0, **columns: object):
     return contacts.Recording(name='ROBOT_made_up', label=label, **parts)
 
 
-def write(path: pathlib.Path, scale: float, seed: int) -> pathlib.Path:
+def write(path, scale, seed):
     """Write a recording of 40 stances, each with a slip of 80 ms with fast rotation."""
     draw = np.random.default_rng(seed)
     label = np.tile(np.repeat([1, 0, 2, 0], [10, 20, 8, 12]), 40)

@@ -3,7 +3,6 @@
 
 import dataclasses
 import math
-import pathlib
 
 import pytest
 import yaml
@@ -27,7 +26,7 @@ def modelled(rows):
     return [row.modelled for row in rows]
 
 
-def own_scene(folder: pathlib.Path, kind: str, table: str, **changes) -> pathlib.Path:
+def own_scene(folder, kind, table, **changes):
     """Write a bench scene and its own table of measurements; return the scene's path."""
     shipped = configuration.shared_folder() / 'scenes' / f'bench_{kind}.yaml'
     (folder / 'mine.csv').write_text(table)
