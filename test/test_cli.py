@@ -10,9 +10,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+from shared import python, wait_for
 
 from ros_pad import cli, configuration
 from ros_pad.bags import BagReader
@@ -20,7 +20,6 @@ from ros_pad.errors import BagError
 from ros_pad.records import PRESSURE
 from ros_pad.signals import INTERRUPTED
 
-CAP = 300.0  # s: no test waits longer for an event, however slow the machine
 SCENE = configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml'
 
 
@@ -219,9 +218,7 @@ def test_a_signal_during_imports_leaves_no_traceback(imported, number):
     script = INTERRUPTED_START.format(
         imported=imported, number=number, module=module, function=function
     )
-    child = subprocess.run(
-        [sys.executable, '-c', script], cwd=root, capture_output=True, text=True, timeout=CAP
-    )
+    child = python('-c', script, cwd=root)
     assert (child.returncode, child.stdout) == (INTERRUPTED, '')
     assert child.stderr == 'pad: stopped\n'
 
@@ -232,19 +229,10 @@ def environment():
     return {**os.environ, 'PYTHONPATH': str(SCENE.parent.parent.parent)}
 
 
-def pad(*arguments):
-    return [sys.executable, '-m', 'ros_pad', *arguments]
-
-
 def test_a_run_on_nodes_is_recorded_and_reported(tmp_path, environment):
     out = tmp_path / 'walk'
-    child = subprocess.run(
-        pad('run', 'hexapod_patches', '--cycles', '4', '--out', str(out)),
-        capture_output=True,
-        text=True,
-        timeout=CAP,
-        env=environment,
-    )
+    words = ('run', 'hexapod_patches', '--cycles', '4', '--out', out)
+    child = python('-m', 'ros_pad', *words, env=environment)
     assert child.returncode == 0, child.stderr
     for part in ('adaptive', 'flat', 'dome', 'oracle', 'mm/cycle', 'report.html', 'times real'):
         assert part in child.stdout
@@ -263,21 +251,20 @@ def test_a_run_on_nodes_is_recorded_and_reported(tmp_path, environment):
 
 def test_ctrl_c_leaves_vented_pads_and_a_readable_bag(tmp_path, environment):
     out = tmp_path / 'walk'
+    words = ['run', 'hexapod_patches', '--policy', 'dome', '--cycles', '600', '--out', str(out)]
+    mcap = out / 'bag' / 'bag_0.mcap'
     with subprocess.Popen(
-        pad('run', 'hexapod_patches', '--policy', 'dome', '--cycles', '600', '--out', str(out)),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        [sys.executable, '-m', 'ros_pad', *words], stderr=subprocess.PIPE, text=True,
         env=environment,
-    ) as child:
+    ) as child:  # fmt: skip
         try:
-            deadline = time.monotonic() + CAP
-            mcap = out / 'bag' / 'bag_0.mcap'
-            while not (mcap.exists() and mcap.stat().st_size > 300_000):
-                assert child.poll() is None and time.monotonic() < deadline
-                time.sleep(0.05)
+            wait_for(
+                lambda: (
+                    child.poll() is not None or (mcap.exists() and mcap.stat().st_size > 300_000)
+                )
+            )
             child.send_signal(signal.SIGINT)
-            _, said = child.communicate(timeout=CAP)
+            _, said = child.communicate()
         finally:
             child.kill()
     assert child.returncode == INTERRUPTED

@@ -5,11 +5,11 @@ import ast
 import functools
 import pathlib
 import re
-import subprocess
 import sys
 
 import pytest
 import yaml
+from shared import python
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SOURCE = ROOT / 'ros_pad'
@@ -131,13 +131,8 @@ except ModuleNotFoundError:
 
 
 def test_everything_but_nodes_and_reports_imports_without_ros_and_extras():
-    child = subprocess.run(
-        [sys.executable, '-c', WITHOUT.format(missing=sorted({*ROS, *EXTRAS}))],
-        cwd=SOURCE.parent,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    script = WITHOUT.format(missing=sorted({*ROS, *EXTRAS}))
+    child = python('-c', script, cwd=SOURCE.parent)
     assert child.returncode == 0, child.stderr
     imported = child.stdout.split('\n')
     assert 'no rclpy' in imported
@@ -159,13 +154,7 @@ print(*sys.modules)
 
 
 def test_the_contact_model_imports_little():
-    child = subprocess.run(
-        [sys.executable, '-c', QUICK],
-        cwd=SOURCE.parent,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    child = python('-c', QUICK, cwd=SOURCE.parent)
     assert child.returncode == 0, child.stderr
     names = child.stdout.split()
     foreign = {name.split('.')[0] for name in names} - set(sys.stdlib_module_names)

@@ -21,6 +21,7 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.writer import Writer
 from rclpy.serialization import serialize_message
+from shared import wait_for
 from std_msgs.msg import Float64, String
 
 from ros_pad.bags import BagReader, BagWriter, recovery
@@ -114,9 +115,7 @@ def test_what_is_flushed_is_sent_on_to_the_disk(tmp_path, monkeypatch):
             if number in (3, 7):
                 writer.flush()
             if number in (0, 3, 7):  # the first message is flushed at once
-                until = time.monotonic() + 10.0
-                while len(on_disk) < 1 + (number + 1) // 4 and time.monotonic() < until:
-                    time.sleep(0.01)
+                wait_for(lambda n=number: len(on_disk) >= 1 + (n + 1) // 4)
     assert len(on_disk) == 4  # the first message, two flushes, the end
     for cut, count in enumerate((1, 4, 8)):
         recovery.repair(tmp_path / f'cut_{cut}', tmp_path / f'whole_{cut}')

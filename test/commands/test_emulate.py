@@ -4,9 +4,9 @@
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+from shared import wait_for
 
 from ros_pad.regulators import create
 
@@ -47,10 +47,7 @@ def test_a_backend_talks_to_its_emulator(emulate, tmp_path, name, arguments, opt
     regulator = create(name, port=path, silence=5.0, **options)
     regulator.open()
     regulator.set_pressure(50e3)
-    end = time.monotonic() + LIMIT
-    while abs(regulator.read().pressure - 50e3) > 500.0:
-        assert time.monotonic() < end
-        time.sleep(0.005)
+    wait_for(lambda: abs(regulator.read().pressure - 50e3) <= 500.0)
     assert regulator.read().faults == ()
     regulator.close()
     child.send_signal(signal.SIGINT)

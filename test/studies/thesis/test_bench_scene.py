@@ -37,21 +37,6 @@ def written(folder, kind, *changes):
     return file
 
 
-def test_values_come_where_they_belong():
-    assert BenchScene.load('bench_inflation').setup.claimed_error == 0.03
-    press = BenchScene.load('bench_press').setup
-    assert press.pressure == 75e3 and press.text_forces == (0.1, 0.2, 0.3)
-    drag = BenchScene.load('bench_tangential').setup
-    assert (drag.speed, drag.dwell, drag.highest_load) == (2e-4, 1.0, 0.4)
-    assert (drag.film_thickness, drag.viscosity) == (3e-4, 1e-3)
-    assert (drag.advancing_angle, drag.receding_angle) == (2.0944, 1.5708)
-    assert (drag.claimed_smallest, drag.claimed_largest) == (3e-4, 8e-4)
-    foot = BenchScene.load('bench_foot')
-    assert (foot.setup.pressure, foot.setup.speed, foot.setup.roughness) == (50e3, 2e-4, 2e-6)
-    assert (foot.setup.claimed_lowest, foot.setup.claimed_highest) == (0.15, 0.25)
-    assert foot.foot.limit == 'flattening' and foot.foot.pads == 19
-
-
 def test_the_dragged_foot_has_one_pad_and_all_of_its_sole():
     whole = Foot.load('large19')
     one = BenchScene.load('bench_tangential').foot
