@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The citation agrees with the package."""
 
-from __future__ import annotations
-
 import pathlib
 import xml.etree.ElementTree
 

@@ -148,18 +148,3 @@ class TestMaterials:
         )
         assert other['candidates'][0]['radius_m'] == 0.5e-3
         assert other['ceiling'] == 90e3
-
-    def test_the_line_of_a_foot_is_its_criterion(self, tmp_path, capsys):
-        shipped = configuration.locate('feet', 'small217').read_text()
-        line = 'measured_limit: {force: 0.005, pressure: 1.0e+4, slope: 1.0e-6}'
-        own = tmp_path / 'own.yaml'
-        own.write_text(
-            shipped.replace('pad:', f'pad:\n  {line}', 1).replace('flattening', 'measured')
-        )
-        found = of_materials(capsys, '--load', '1', '--foot', str(own))
-        needed = 1e4 + (1.2 / 217 - 0.005) / 1e-6
-        assert found['criterion'] == 'measured'
-        assert found['candidates'][0]['pressure_pa'] == pytest.approx([needed] * 3, rel=1e-9)
-        # It says nothing of another sheet.
-        thin = of_materials(capsys, '--load', '1', '--foot', str(own), '--thickness', '0.1e-3')
-        assert thin['criterion'] == 'flattening'

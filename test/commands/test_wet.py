@@ -5,11 +5,10 @@ import dataclasses
 import json
 import math
 
-import numpy as np
 import pytest
 
 from ros_pad import cli, configuration
-from ros_pad.capillary import Mesh, Wall, bath_meniscus, wet, wet_pattern, wet_surface
+from ros_pad.capillary import Mesh, Wall, bath_meniscus, wet, wet_pattern
 from ros_pad.contact import THESIS_LIQUID, WATER
 
 DOME = ['wet', 'dome', '--radius', '1.55e-3', '--contact-radius', '0.6e-3']
@@ -83,22 +82,6 @@ def test_least_energy_around_one_pad(tmp_path, capsys):
     assert values['capillary_force_n'] == pytest.approx(width, rel=1e-2)
     assert values['time_s'] > 0.0
     assert figure.read_bytes().startswith(b'\x89PNG')
-
-
-@pytest.mark.slow
-def test_least_energy_between_many_pads_and_off_the_origin(tmp_path, capsys):
-    sizes = ['--radius', '1.55e-3', '--contact-radius', '0.6e-3', '--height', '2.6e-3']
-    pattern = ['wet', 'pattern', '--pads', '19', '--pitch', '4.4e-3', *sizes, '--method', 'energy']
-    values = asked(pattern, capsys)
-    area = math.sqrt(0.75) * 4.4e-3**2
-    exact = wet_surface(Wall.dome(1.55e-3, 0.6e-3, 2.6e-3), WATER, area)
-    assert values['pull_n'] == pytest.approx(-exact.force[2], rel=5e-3)
-    assert values['capillary_force_n'] is None
-    mesh = Mesh.dome(1.55e-3, 0.6e-3, 2.6e-3)
-    moved = Mesh(mesh.points + np.array([3e-3, -1e-3, 0.0]), mesh.faces)
-    found = wet_surface(moved, WATER, area)
-    assert found.mean_height == pytest.approx(values['height_m'], rel=1e-4)
-    assert found.line[:, :2].mean(axis=0) == pytest.approx([3e-3, -1e-3], abs=1e-6)
 
 
 def test_least_energy_without_an_answer(capsys):

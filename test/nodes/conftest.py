@@ -6,8 +6,6 @@ them at the end. ``until(predicate)`` spins the executor until the predicate hol
 test after a timeout. ``bench`` hands messages to nodes without DDS: see helpers.py.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import tempfile

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study of force limits."""
 
-from __future__ import annotations
-
 import json
 import pathlib
 from dataclasses import replace
