@@ -31,7 +31,7 @@ print(time.perf_counter() - started)
 """
 
 
-def time_of_work() -> float:
+def time_of_work():
     """Return the time, s, of WORK in two processes at once: median of three measurements."""
     times = []
     for _ in range(3):
@@ -46,7 +46,7 @@ def time_of_work() -> float:
 first_time_of_work = functools.cache(time_of_work)
 
 
-def skip_if_slow(time: float) -> None:
+def skip_if_slow(time):
     """Skip the test if ``time``, s, of the work is above SLOWEST."""
     if time > SLOWEST:
         pytest.skip(
@@ -55,7 +55,7 @@ def skip_if_slow(time: float) -> None:
         )
 
 
-def pytest_runtest_setup(item: pytest.Item) -> None:
+def pytest_runtest_setup(item):
     """Skip a test with the mark ``realtime`` if the machine is too slow."""
     if item.get_closest_marker('realtime'):
         skip_if_slow(first_time_of_work())

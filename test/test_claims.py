@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every figure of the README is in a file that a study wrote (docs/claims.yaml)."""
 
-from __future__ import annotations
-
 import json
 import math
 import pathlib

@@ -222,7 +222,7 @@ def test_shared_folder_of_an_installed_package(tmp_path, monkeypatch):
     'place',
     ['.', 'lib/python3.12/site-packages', 'lib/python3/dist-packages'],
 )
-def test_the_shared_folder_is_that_of_the_package(tmp_path, monkeypatch, place: str):
+def test_the_shared_folder_is_that_of_the_package(tmp_path, monkeypatch, place):
     """It is not that of another version in the virtual environment or in a sourced workspace."""
     folders = {}
     for name in ('own', 'other'):

@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What contributors and their tools read agrees with the package."""
-
-from __future__ import annotations
+"""The citation agrees with the package."""
 
 import pathlib
-import re
 import xml.etree.ElementTree
 
 import yaml
@@ -24,14 +21,3 @@ def test_the_citation_is_of_this_version():
     assert str(citation['version']) == ros_pad.__version__
     assert citation['license'] == PACKAGE.findtext('license')
     assert [each['name'] for each in citation['authors']] == [PACKAGE.findtext('maintainer')]
-
-
-def test_hooks_run_what_make_lint_runs():
-    makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
-    recipe = re.search(r'^lint:.*\n((?:\t.*\n)+)', makefile, re.MULTILINE)[1]
-    linted = [line.strip().replace('$(BIN)', '.venv/bin') for line in recipe.splitlines()]
-    (local,) = read(ROOT / '.pre-commit-config.yaml')['repos']
-    assert local['repo'] == 'local'
-    assert [hook['entry'] for hook in local['hooks']] == linted
-    for hook in local['hooks']:
-        assert (hook['language'], hook['pass_filenames']) == ('system', False)

@@ -5,11 +5,11 @@ import ast
 import functools
 import pathlib
 import re
-import subprocess
 import sys
 
 import pytest
 import yaml
+from shared import python
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SOURCE = ROOT / 'ros_pad'
@@ -37,27 +37,27 @@ WORDS = {'rclpy and the messages': ROS, 'matplotlib': {'matplotlib', 'mpl_toolki
 
 
 @functools.cache
-def allowed(part: str) -> frozenset[str]:
+def allowed(part):
     """Return the parts that a part may import: those of its row, and all that these may import."""
     direct = TABLE[part].get('imports', [])
     return frozenset({*direct, *(each for other in direct for each in allowed(other))})
 
 
-def libraries(part: str, key: str) -> set[str]:
+def libraries(part, key):
     """Return the packages of other projects in one column of a part's row."""
     return {name for word in TABLE[part].get(key, []) for name in WORDS.get(word, {word})}
 
 
-def files(part: str) -> list[pathlib.Path]:
+def files(part):
     """Return the source files of a part, which is one module or one package."""
     return [*SOURCE.glob(f'{part}.py'), *SOURCE.glob(f'{part}/**/*.py')]
 
 
-def imports(path: pathlib.Path) -> set[tuple[str, bool]]:
+def imports(path):
     """Return (dotted name, inside a function) of all imports in a file."""
     found = set()
 
-    def visit(node: ast.AST, inside: bool) -> None:
+    def visit(node, inside):
         inside |= isinstance(node, ast.FunctionDef)
         if isinstance(node, ast.Import):
             found.update((alias.name, inside) for alias in node.names)
@@ -80,7 +80,7 @@ def test_the_table_has_every_part_and_every_part_imports_what_is_below_it():
 
 
 @pytest.mark.parametrize('part', TABLE)
-def test_imports_run_down(part: str):
+def test_imports_run_down(part):
     paths = files(part)
     assert paths
     used = set()
@@ -131,13 +131,8 @@ except ModuleNotFoundError:
 
 
 def test_everything_but_nodes_and_reports_imports_without_ros_and_extras():
-    child = subprocess.run(
-        [sys.executable, '-c', WITHOUT.format(missing=sorted({*ROS, *EXTRAS}))],
-        cwd=SOURCE.parent,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    script = WITHOUT.format(missing=sorted({*ROS, *EXTRAS}))
+    child = python('-c', script, cwd=SOURCE.parent)
     assert child.returncode == 0, child.stderr
     imported = child.stdout.split('\n')
     assert 'no rclpy' in imported
@@ -159,13 +154,7 @@ print(*sys.modules)
 
 
 def test_the_contact_model_imports_little():
-    child = subprocess.run(
-        [sys.executable, '-c', QUICK],
-        cwd=SOURCE.parent,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    child = python('-c', QUICK, cwd=SOURCE.parent)
     assert child.returncode == 0, child.stderr
     names = child.stdout.split()
     foreign = {name.split('.')[0] for name in names} - set(sys.stdlib_module_names)

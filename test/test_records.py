@@ -9,7 +9,7 @@ import pytest
 
 from ros_pad.control import faults
 from ros_pad.estimation import doubt
-from ros_pad.records import KINDS, SAMPLE, Block
+from ros_pad.records import KINDS, SAMPLE
 
 PAGE = pathlib.Path(__file__).resolve().parents[1] / 'docs' / 'topics.md'
 
@@ -68,11 +68,6 @@ def test_numbers_of_a_record_are_named_by_leg():
     names = SAMPLE.names((1, 4))
     assert len(names) == 2 * len(SAMPLE.columns) == len(set(names))
     assert names[:3] == ('leg_1/force_x', 'leg_1/force_y', 'leg_1/force_z')
-
-
-def test_a_block_of_one_moment():
-    block = Block.of(2_000_000_000, SAMPLE.rows(4))
-    assert block.rows.shape == (1, 4) and block.last_ns == 2_000_000_000
 
 
 if __name__ == '__main__':

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 import os
 import signal
-import subprocess
-import sys
 
 import pytest
+from shared import python
 
 from ros_pad.signals import STOP, interrupt
 
@@ -24,9 +23,7 @@ STOP.install('stopped\\n')
 
 def run(script):
     """Run a script after ``STOP.install``; return its exit status, output and standard error."""
-    child = subprocess.run(
-        [sys.executable, '-c', BEGIN + script], capture_output=True, text=True, timeout=60
-    )
+    child = python('-c', BEGIN + script)
     return child.returncode, child.stdout, child.stderr
 
 
@@ -107,7 +104,7 @@ def test_the_module_imports_nothing_heavy():
     script = (
         'import sys, ros_pad.signals; print(*{"numpy", "rclpy", "argparse"} & set(sys.modules))'
     )
-    child = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True)
+    child = python('-c', script)
     assert (child.returncode, child.stdout) == (0, '\n')
 
 

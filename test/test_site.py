@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The site: it builds without a warning, has every name, and fits a narrow screen."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import pathlib

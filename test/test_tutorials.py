@@ -7,10 +7,10 @@ import pathlib
 import re
 import shlex
 import subprocess
-import sys
 
 import pytest
 import yaml
+from shared import python
 
 from ros_pad import cli, configuration
 from ros_pad.regulators import emulate
@@ -130,13 +130,7 @@ def test_own_regulator(tmp_path):
     script = tmp_path / 'try_it.py'
     script.write_text(program.replace(options.link, str(port)))
     with emulate.Emulator(device, str(port)):
-        child = subprocess.run(
-            [sys.executable, str(script)],
-            env={**os.environ, 'PYTHONPATH': str(ROOT)},
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
+        child = python(script, env=os.environ | {'PYTHONPATH': str(ROOT)})
     assert child.returncode == 0, child.stderr
     (expected,) = (each for each in blocks(page) if each.startswith('Reading('))
     assert child.stdout.partition(', time=')[0] == expected.partition(', time=')[0]

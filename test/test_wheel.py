@@ -6,8 +6,6 @@ from the one that runs the tests. With ``WHEEL_LIBRARIES=index`` they are instal
 ``make test-matrix MATRIX=3.12-wheel`` does.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import pathlib

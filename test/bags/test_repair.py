@@ -21,6 +21,7 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.writer import Writer
 from rclpy.serialization import serialize_message
+from shared import wait_for
 from std_msgs.msg import Float64, String
 
 from ros_pad.bags import BagReader, BagWriter, recovery
@@ -29,7 +30,7 @@ from ros_pad.errors import BagError
 from ros_pad.trials.bag_notes import RECORDED_AT
 
 
-def data_in(folder: pathlib.Path, topic: str) -> list[float]:
+def data_in(folder, topic):
     return [message.data for _, message, _ in BagReader(folder).messages({topic})]
 
 
@@ -47,7 +48,7 @@ def trial(tmp_path):
     return folder
 
 
-def chunks(path: pathlib.Path):
+def chunks(path):
     with path.open('rb') as stream:
         return sorted(
             make_reader(stream).get_summary().chunk_indexes,
@@ -114,9 +115,7 @@ def test_what_is_flushed_is_sent_on_to_the_disk(tmp_path, monkeypatch):
             if number in (3, 7):
                 writer.flush()
             if number in (0, 3, 7):  # the first message is flushed at once
-                until = time.monotonic() + 10.0
-                while len(on_disk) < 1 + (number + 1) // 4 and time.monotonic() < until:
-                    time.sleep(0.01)
+                wait_for(lambda n=number: len(on_disk) >= 1 + (n + 1) // 4)
     assert len(on_disk) == 4  # the first message, two flushes, the end
     for cut, count in enumerate((1, 4, 8)):
         recovery.repair(tmp_path / f'cut_{cut}', tmp_path / f'whole_{cut}')
@@ -267,7 +266,7 @@ def test_any_cut_is_read_without_a_fall(trial, tmp_path):
 
 
 def test_an_error_of_the_callback_is_no_damage(trial, tmp_path):
-    def progress(share: float) -> None:
+    def progress(share):
         if 0.1 < share < 0.5:  # while the bag is read, before anything is written
             raise BrokenPipeError
 

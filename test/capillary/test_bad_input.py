@@ -13,6 +13,8 @@ from ros_pad.errors import InvalidInput
 RUBBER = Material.load('dragon_skin_10')
 WALL = capillary.Wall.dome(1.55e-3, 0.583e-3, 2.9e-3)
 MESH = capillary.Mesh.dome(1.55e-3, 0.583e-3, rings=6, sectors=12)
+PRESSED = contact.press(LARGE_PAD, 75e3, 0.3)
+DRY = contact.Liquid(0.073, 0.027, contact_angle=2.8)
 ANGLES = {'advancing_angle': 1.5, 'receding_angle': 1.0}
 TENSIONS = {'solid_tension': 0.027, 'surface_tension': 0.073}
 DESIGN = {'load': 7.0, 'area': 9e-4, 'ceiling': 90e3, 'margin': 1.2}
@@ -108,12 +110,31 @@ def test_bad_values_are_named(function, good, name):
             function(**good | {name: value})
 
 
-def test_shapes_that_do_not_fit_together_are_refused():
-    for call in (
-        lambda: contact.press(LARGE_PAD, [1e3, 2e3], [0.1, 0.1, 0.1]),
-        lambda: contact.pressure_for(LARGE_PAD, [0.1, 0.2], margin=[1.0, 2.0, 3.0]),
-        lambda: contact.capillary_pull([1.0, 2.0], [1e-4, 1e-4, 1e-4], WATER),
-        lambda: contact.hysteresis_force([1e-3, 2e-3], 0.073, [1.5, 1.6, 1.7], 1.0),
-    ):
-        with pytest.raises(InvalidInput, match='broadcast'):
-            call()
+BRIDGE = {'radius': 1e-3, 'surface_tension': 0.073, 'contact_angle': 0.5}
+REFUSED = (
+    (contact.press, {'pad': LARGE_PAD, 'pressure': [1e3, 2e3], 'force': [0.1] * 3}, 'broadcast'),
+    (contact.pressure_for, {'pad': LARGE_PAD, 'force': [0.1] * 2, 'margin': [1.0] * 3}, 'broadc'),
+    (contact.capillary_pull, {'radius': [1.0] * 2, 'film': [1e-4] * 3, 'liquid': WATER}, 'broadc'),
+    (contact.capillary_pull, {'radius': 1e-3, 'film': 6e-3, 'liquid': WATER}, r'up to 0\.0054'),
+    (contact.bridge, BRIDGE, 'exactly one'),
+    (contact.bridge, BRIDGE | {'filling_angle': math.pi}, 'filling_angle'),
+    (contact.bridge, BRIDGE | {'volume': 0.0, 'method': 'young_laplace'}, 'volume'),
+    (contact.bridge, BRIDGE | {'filling_angle': 0.5, 'method': 'toroid'}, 'young_laplace, circle'),
+    (contact.bridge, BRIDGE | {'filling_angle': 0.5, 'gravity': 9.81}, 'gravity'),
+    (contact.meniscus, {'pressed': PRESSED, 'liquid': WATER, 'reading': 'printed'}, 'corrected, '),
+    (contact.meniscus, {'pressed': PRESSED, 'liquid': DRY}, 'contact_angle'),
+    (capillary.Wall.dome, {'sphere_radius': 1e-3, 'contact_radius': 1e-3}, 'contact_radius'),
+    (capillary.Wall.dome, DOME | {'height': 4e-3}, 'height'),
+    (capillary.Wall.cone, {'contact_radius': 1e-3, 'inclination': 0.0}, 'inclination'),
+    (capillary.Wall.through, {'radii': [1e-3], 'heights': [0.0]}, 'radii'),
+    (capillary.Wall.through, {'radii': [1e-3, 1e-3], 'heights': [1e-3, 0.0]}, 'heights'),
+    (capillary.wet, {'mesh': MESH, 'liquid': WATER, 'axis': (0.0, math.nan)}, 'axis = nan'),
+    (capillary.wet_surface, {'pad': capillary.Wall.cylinder(1e-3), 'liquid': WATER}, 'wall.top'),
+    (capillary.wet_surface, {'pad': WALL, 'liquid': WATER, 'area': 7e-6}, 'area'),
+)
+
+
+@pytest.mark.parametrize(('function', 'given', 'words'), REFUSED)
+def test_values_that_do_not_fit_together_are_refused(function, given, words):
+    with pytest.raises(InvalidInput, match=words):
+        function(**given)

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from ros_pad.capillary.bath import Wall, bath_meniscus
 from ros_pad.contact.meniscus import GRAVITY, Liquid
-from ros_pad.errors import InvalidInput, NoSurface
+from ros_pad.errors import NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
 pytestmark = pytest.mark.slow
@@ -135,21 +135,6 @@ def test_of_several_the_first_from_the_floor_is_taken():
     assert found.status == 'several'
     neck = rise(Wall.cylinder(0.02), 30)
     assert found.height == pytest.approx(neck.height, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ('call', 'name'),
-    [
-        (lambda: Wall.dome(1e-3, 1e-3), 'contact_radius'),
-        (lambda: Wall.dome(1e-3, 0.5e-3, height=3e-3), 'height'),
-        (lambda: Wall.cone(1e-3, 0.0), 'inclination'),
-        (lambda: Wall.through([1e-3], [0.0]), 'radii'),
-        (lambda: Wall.through([1e-3, 1e-3], [1e-3, 0.0]), 'heights'),
-    ],
-)
-def test_bad_input(call, name):
-    with pytest.raises(InvalidInput, match=name):
-        call()
 
 
 def test_surface_through_the_wall_is_refused():

@@ -6,7 +6,6 @@ direction; they overlap if circles inside them at one height do.
 """
 
 import math
-import pathlib
 import re
 
 import numpy as np
@@ -25,12 +24,12 @@ CUBE_FACES = np.array(
 )
 
 
-def turned(points: np.ndarray, turn: float) -> np.ndarray:
+def turned(points, turn):
     c, s = math.cos(turn), math.sin(turn)
     return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def together(*bodies: tuple[np.ndarray, np.ndarray], kind=float) -> Mesh:
+def together(*bodies, kind=float):
     """Return one mesh of bodies (points, faces), with points rounded to numbers of a kind."""
     begin = np.cumsum([0] + [len(points) for points, _ in bodies])
     faces = [faces + first for (_, faces), first in zip(bodies, begin, strict=False)]
@@ -38,7 +37,7 @@ def together(*bodies: tuple[np.ndarray, np.ndarray], kind=float) -> Mesh:
     return Mesh(points, np.concatenate(faces), 'pad.stl')
 
 
-def refused(*bodies, kind=float) -> np.ndarray:
+def refused(*bodies, kind=float):
     """Check that bodies are refused, and return the place in the message, m."""
     with pytest.raises(MeshError) as error:
         together(*bodies, kind=kind)
@@ -50,7 +49,7 @@ def refused(*bodies, kind=float) -> np.ndarray:
 
 
 @pytest.mark.parametrize('seed', range(8))
-def test_domes_overlap_or_not_at_any_azimuth(seed: int):
+def test_domes_overlap_or_not_at_any_azimuth(seed):
     rng = np.random.default_rng(seed)
     rings, sectors = rng.integers(3, 32, 2).tolist()
     dome, azimuth = Mesh.dome(R, B, 2.2e-3, rings, sectors), rng.uniform(0.0, 7.0)
@@ -80,7 +79,7 @@ def test_domes_overlap_or_not_at_any_azimuth(seed: int):
 )
 @pytest.mark.parametrize('turn', [0.0, 1.0])
 @pytest.mark.parametrize('kind', [float, np.float32])
-def test_boxes_overlap(low, high, turn: float, kind):
+def test_boxes_overlap(low, high, turn, kind):
     cube, box = turned(CUBE, turn), turned(np.where(CUBE > 0, high, low), turn)
     place = refused((cube, CUBE_FACES), (box, CUBE_FACES), kind=kind)
     back = turned(place, -turn)
@@ -117,7 +116,7 @@ def test_boxes_that_touch_do_not_overlap(low, high, kind):
     ],
     ids=lambda mesh: mesh.source,
 )
-def test_rounding_in_a_file_is_no_overlap(mesh: Mesh, tmp_path: pathlib.Path):
+def test_rounding_in_a_file_is_no_overlap(mesh, tmp_path):
     pytest.importorskip('meshio')
     mesh = Mesh(turned(mesh.points, 0.4) + np.array([0.011, -0.007, 0.0]), mesh.faces)
     mesh.write(tmp_path / 'pad.stl')

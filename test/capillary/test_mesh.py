@@ -3,7 +3,6 @@
 
 import builtins
 import math
-import pathlib
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ CUBE_FACES = np.array(
 )
 
 
-def cube() -> Mesh:
+def cube():
     return Mesh(CUBE_POINTS, CUBE_FACES, 'cube')
 
 
@@ -70,13 +69,13 @@ def test_a_pattern_is_hexagonal():
         (lambda: Mesh.cone(0.0, 0.0, 1e-3), 'top_radius = 0'),
     ],
 )
-def test_generators_name_what_is_wrong(call, part: str):
+def test_generators_name_what_is_wrong(call, part):
     with pytest.raises(InvalidInput) as error:
         call()
     assert part in str(error.value)
 
 
-def changed(points=CUBE_POINTS, faces=CUBE_FACES) -> Mesh:
+def changed(points=CUBE_POINTS, faces=CUBE_FACES):
     return Mesh(points, faces, 'changed')
 
 
@@ -105,7 +104,7 @@ FLAT[3] = np.nan
         (1e-3 * CUBE_POINTS, CUBE_FACES, '1e-05 to 0.5 m'),
     ],
 )
-def test_broken_meshes_are_refused(points, faces, part: str):
+def test_broken_meshes_are_refused(points, faces, part):
     with pytest.raises(MeshError) as error:
         changed(points, faces)
     assert part in str(error.value)
@@ -120,7 +119,7 @@ def test_what_files_miss_the_floor_by_is_taken_off():
 
 
 @pytest.mark.parametrize('suffix', ['.stl', '.obj', '.ply', '.msh'])
-def test_files_come_back(suffix: str, tmp_path: pathlib.Path):
+def test_files_come_back(suffix, tmp_path):
     pytest.importorskip('meshio')
     path = tmp_path / f'dome{suffix}'
     dome = Mesh.dome(R, B, rings=8, sectors=12)
@@ -141,7 +140,7 @@ def test_files_come_back(suffix: str, tmp_path: pathlib.Path):
     assert Mesh.read(path, scale=2.0).volume == pytest.approx(8.0 * dome.volume, rel=1e-6)
 
 
-def test_quadrangles_are_read(tmp_path: pathlib.Path):
+def test_quadrangles_are_read(tmp_path):
     meshio = pytest.importorskip('meshio')
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     meshio.Mesh(CUBE_POINTS, [('quad', np.array(quads))]).write(tmp_path / 'quads.ply')
@@ -161,9 +160,7 @@ def test_quadrangles_are_read(tmp_path: pathlib.Path):
         ('a.msh', ''),
     ],
 )
-def test_files_that_are_no_meshes(
-    name: str, text: str, tmp_path: pathlib.Path, capfd: pytest.CaptureFixture[str]
-):
+def test_files_that_are_no_meshes(name, text, tmp_path, capfd):
     pytest.importorskip('meshio')
     (tmp_path / name).write_text(text)
     with pytest.raises(MeshError) as error:
@@ -172,16 +169,14 @@ def test_files_that_are_no_meshes(
     assert capfd.readouterr().out == ''
 
 
-def test_missing_files_and_other_endings(tmp_path: pathlib.Path):
+def test_missing_files_and_other_endings(tmp_path):
     with pytest.raises(MeshError, match='no such file'):
         Mesh.read(tmp_path / 'none.stl')
     with pytest.raises(MeshError, match=r'\.stl, \.obj, \.ply, \.msh'):
         Mesh.read(tmp_path / 'none.step')
 
 
-def test_without_meshio_the_pip_line_is_named(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_without_meshio_the_pip_line_is_named(tmp_path, monkeypatch):
     real = builtins.__import__
 
     def without(name, *rest):

@@ -8,7 +8,7 @@ import pytest
 
 from ros_pad.capillary import Mesh, Wall, bath_meniscus, wet_surface
 from ros_pad.contact import Liquid
-from ros_pad.errors import InvalidInput, MeshError, NoSurface
+from ros_pad.errors import MeshError, NoSurface
 
 SPHERE, REST = 1.55e-3, 0.583e-3
 START = math.asin(REST / SPHERE)
@@ -134,16 +134,3 @@ def test_meshes_that_are_no_wall_are_refused():
     for mesh in (two, leaning, Mesh.cylinder(1e-3, 2e-3, 1, 3)):
         with pytest.raises(MeshError, match='the wall'):
             wet_surface(mesh, water(50))
-
-
-@pytest.mark.parametrize(
-    ('given', 'name'),
-    [
-        ({'pad': Wall.cylinder(1e-3)}, 'wall.top'),
-        ({'area': 7e-6}, 'area'),
-        ({'area': 2e-5, 'sectors': 16}, 'sectors'),
-    ],
-)
-def test_bad_input(given, name):
-    with pytest.raises(InvalidInput, match=name):
-        wet_surface(**{'pad': WALL, 'liquid': water(50), **given})

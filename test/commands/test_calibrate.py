@@ -63,24 +63,6 @@ def test_a_material_has_a_factor(here, capsys):
     assert (here / found['figure']).stat().st_size > 20_000
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'complaint'),
-    [
-        (['none.csv'], 'none.csv: cannot be read'),
-        ([THESIS, '--out', 'foot.txt'], "'.txt' is not allowed: one of .yaml"),
-        ([THESIS, '--thickness', '4e-4'], '--material and --thickness are both needed'),
-        (
-            [THESIS, '--material', 'dragon_skin_10', '--thickness', '0.4'],
-            'thickness = 0.4 is not allowed: a number above 0 and up to 0.0015 m',
-        ),
-    ],
-)
-def test_bad_input_writes_nothing(here, capsys, arguments, complaint):
-    assert cli.main(['calibrate', *arguments]) == 2
-    assert complaint in capsys.readouterr().err
-    assert list(here.iterdir()) == []
-
-
 def test_no_foot_is_left_behind_when_its_picture_cannot_be_written(here, capsys):
     assert cli.main(['calibrate', THESIS, '--out', 'none/own.yaml']) == 1
     assert 'none' in capsys.readouterr().err

@@ -6,9 +6,9 @@ import os
 import pathlib
 import shutil
 import subprocess
-import sys
 
 import pytest
+from shared import python
 
 from ros_pad import cli
 from ros_pad.commands import study
@@ -62,9 +62,7 @@ def test_a_bench_scene_refuses_options_of_a_walk(words, runs, capsys):
 def test_a_bench_scene_runs_in_a_checkout(tmp_path):
     out = tmp_path / 'out'
     words = ['run', 'bench_inflation', '--json', '--out', str(out)]
-    found = subprocess.run(
-        [sys.executable, '-m', 'ros_pad', *words], capture_output=True, text=True, cwd=tmp_path
-    )
+    found = python('-m', 'ros_pad', *words, cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     assert json.loads(found.stdout)['scene'] == 'bench_inflation'
     assert (out / 'report.html').is_file()
@@ -74,13 +72,8 @@ def test_without_a_checkout_it_is_written_where_studies_are(tmp_path):
     """The package is copied to a folder without studies."""
     shutil.copytree(PACKAGE, tmp_path / 'ros_pad', ignore=shutil.ignore_patterns('__pycache__'))
     shutil.copytree(PACKAGE.parent / 'config', tmp_path / 'config')
-    found = subprocess.run(
-        [sys.executable, '-m', 'ros_pad', 'chart', 'contact'],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env=os.environ | {'PYTHONPATH': str(tmp_path)},
-    )
+    alone = os.environ | {'PYTHONPATH': str(tmp_path)}
+    found = python('-m', 'ros_pad', 'chart', 'contact', cwd=tmp_path, env=alone)
     assert found.returncode == 1
     assert 'Clone ros_pad' in found.stderr
     assert not (tmp_path / 'runs').exists()

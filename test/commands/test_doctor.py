@@ -11,7 +11,7 @@ import re
 import shutil
 import sys
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 
@@ -30,14 +30,12 @@ class Usage(NamedTuple):
     free: float
 
 
-def one(findings: Any) -> Finding:
+def one(findings):
     (finding,) = findings
     return finding
 
 
-def test_a_missing_package_is_named_and_the_doctor_goes_on(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_a_missing_package_is_named_and_the_doctor_goes_on(tmp_path, monkeypatch, capsys):
     (tmp_path / 'numpy.py').write_text('raise ModuleNotFoundError("No module named \'numpy\'")')
     monkeypatch.syspath_prepend(str(tmp_path))
     for name in ('extras', 'ros', 'config_folder'):
@@ -50,9 +48,7 @@ def test_a_missing_package_is_named_and_the_doctor_goes_on(
     assert found['logs']['status'] == 'ok'  # the last check still runs
 
 
-def test_extras_that_cannot_be_imported_say_why(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_extras_that_cannot_be_imported_say_why(tmp_path, monkeypatch):
     modules = {
         'broken_pad': 'raise OSError("libGL.so.1: cannot open")',
         'crashing_pad': 'import os; os.abort()',
@@ -77,7 +73,7 @@ def test_the_extras_are_those_of_setup():
         assert re.search(rf"'{extra}': (\[|DOCS,)", text) and f"'{name}>=" in text
 
 
-def test_config_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
+def test_config_folder(monkeypatch, tmp_path):
     assert f'{len(configuration.names("scenes"))} scenes' in one(doctor.config_folder()).found
     monkeypatch.setattr('ros_pad.configuration.__file__', str(tmp_path / 'a' / 'b.py'))
     monkeypatch.setattr(sys, 'prefix', str(tmp_path))
@@ -87,9 +83,7 @@ def test_config_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
     assert str(tmp_path) in finding.found
 
 
-def test_without_ros_it_lists_what_still_works(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_without_ros_it_lists_what_still_works(tmp_path, monkeypatch):
     (tmp_path / 'rclpy.py').write_text('raise ModuleNotFoundError("No module named \'rclpy\'")')
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(doctor, 'ros_sources', dict)
@@ -99,9 +93,7 @@ def test_without_ros_it_lists_what_still_works(
     assert 'ros_pad[ros]' in finding.advice or '/opt/ros' in finding.advice
 
 
-def test_wheels_that_cannot_be_loaded_are_a_problem(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_wheels_that_cannot_be_loaded_are_a_problem(tmp_path, monkeypatch):
     (tmp_path / 'rclpy.py').write_text('raise ImportError("librcl.so: cannot open")')
     monkeypatch.syspath_prepend(str(tmp_path))
     finding = one(doctor.ros())
@@ -124,12 +116,7 @@ PREFIX = {'AMENT_PREFIX_PATH': '/opt/ros/jazzy'}
         (None, {'ROS_DISTRO': 'rolling'}, 'warning'),
     ],
 )
-def test_which_ros_it_is(
-    wheels: str | None,
-    environment: dict[str, str],
-    status: str,
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_which_ros_it_is(wheels, environment, status, monkeypatch):
     for name in ('AMENT_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH', 'ROS_DISTRO'):
         monkeypatch.delenv(name, raising=False)
     for name, value in environment.items():
@@ -142,7 +129,7 @@ def test_which_ros_it_is(
     assert ('one ROS 2 at a time' in finding.advice) == (status == 'problem')
 
 
-def test_a_middleware_that_is_not_installed_is_a_problem(monkeypatch: pytest.MonkeyPatch):
+def test_a_middleware_that_is_not_installed_is_a_problem(monkeypatch):
     pytest.importorskip('rclpy')
     monkeypatch.setenv('RMW_IMPLEMENTATION', 'rmw_of_no_one')
     *_, finding = doctor.ros()
@@ -151,7 +138,7 @@ def test_a_middleware_that_is_not_installed_is_a_problem(monkeypatch: pytest.Mon
 
 
 @pytest.fixture
-def alone(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+def alone(monkeypatch):
     """Let no messages from other processes in, and return ``monkeypatch``."""
     pytest.importorskip('rclpy')
     monkeypatch.setenv('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
@@ -161,19 +148,19 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
-def test_a_message_goes_round(alone: pytest.MonkeyPatch):
+def test_a_message_goes_round(alone):
     finding = doctor.loopback(30.0)  # a machine under test may be slow
     assert finding.status == 'ok', finding
 
 
-def test_processes_that_are_kept_apart_are_a_problem(alone: pytest.MonkeyPatch):
+def test_processes_that_are_kept_apart_are_a_problem(alone):
     alone.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
     finding = doctor.loopback(1.0)
     assert finding.status == 'problem' and 'within 1 s' in finding.found
     assert 'ROS_AUTOMATIC_DISCOVERY_RANGE' in finding.advice
 
 
-def test_serial_ports(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+def test_serial_ports(tmp_path, monkeypatch):
     port = tmp_path / 'ttyUSB0'
     port.touch()
     assert one(doctor.serial_ports([])).found == 'none is plugged in'
@@ -187,23 +174,21 @@ def test_serial_ports(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize(
     ('free', 'status'), [(5e9, 'ok'), (0.5e9, 'warning'), (0.05e9, 'problem')]
 )
-def test_room_for_bags(
-    free: float, status: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_room_for_bags(free, status, tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1e12, 1e12 - free, free))
     runs, _ = doctor.folders(tmp_path)
     assert (runs.what, runs.status) == ('runs/', status)
     assert list(tmp_path.iterdir()) == []  # nothing is left behind
 
 
-def test_folders_that_cannot_be_written(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+def test_folders_that_cannot_be_written(tmp_path, monkeypatch):
     (tmp_path / 'file').touch()
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path / 'file' / 'log'))
     runs, logs = doctor.folders(tmp_path)
     assert (runs.status, logs.status) == ('ok', 'problem')
     assert 'export ROS_LOG_DIR' in logs.advice
 
-    def full(**_: object) -> None:
+    def full(**_):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr('tempfile.TemporaryFile', full)
@@ -211,9 +196,7 @@ def test_folders_that_cannot_be_written(tmp_path: pathlib.Path, monkeypatch: pyt
     assert runs.status == 'problem' and 'Read-only file system' in runs.found
 
 
-def test_the_command_prints_all_and_fails_on_a_problem_alone(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_the_command_prints_all_and_fails_on_a_problem_alone(monkeypatch, capsys):
     found = [
         Finding('Python', 'ok', '3.12'),
         Finding('mujoco', 'warning', 'not here', 'pip install "ros_pad[mujoco]"'),

@@ -111,22 +111,6 @@ def test_a_namespace(tmp_path, capsys):
     assert (status, found['imu/data']['status']) == (0, 'ok')
 
 
-@pytest.mark.parametrize(
-    ('words', 'complaint'),
-    [
-        (['--robot', 'go3'], "no robot named 'go3'. Did you mean 'go2'?"),
-        (['--robot', 'go2', '--mapping', 'go'], "no mapping named 'go'. Did you mean"),
-        (['--robot', 'go2', '--bag', 'nothing'], 'nothing: no such bag'),
-        (['--robot', 'go2', '--seconds', '0'], '--seconds = 0'),
-        (['--robot', 'my.urdf'], '3 to 8 different links are needed'),
-        (['--bag', 'x'], '--bag needs --robot'),
-    ],
-)
-def test_bad_input(words, complaint, capsys):
-    assert cli.main(['doctor', *words]) == 2
-    assert complaint in capsys.readouterr().err
-
-
 # Publishes a log at its rate until it is stopped.
 PUBLISHER = """
 import sys, time

@@ -5,10 +5,9 @@ import argparse
 import json
 import re
 import shlex
-import subprocess
-import sys
 
 import pytest
+from shared import python
 
 from ros_pad import cli
 
@@ -41,7 +40,6 @@ def test_pad_help_names_commands_and_imports_none_of_them():
     for command, summary in cli.COMMANDS.items():
         assert f' {command} ' in text and summary in text
     code = 'import sys; from ros_pad import cli; cli.parser(); print(sorted(sys.modules))'
-    child = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True)
-    modules = json.loads(child.stdout.replace("'", '"'))
+    modules = json.loads(python('-c', code).stdout.replace("'", '"'))
     # Importing these takes time: a second, with all of the commands.
     assert not {'numpy', 'scipy', 'matplotlib', 'mcap'} & set(modules)

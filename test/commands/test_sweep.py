@@ -9,22 +9,18 @@ import pathlib
 import pty
 import re
 import signal
-import sqlite3
 import subprocess
 import sys
 import termios
 import threading
-import time
 
 import pytest
+from shared import wait_for
 
 from ros_pad import cli
 from ros_pad.commands.sweep import parameters, seeds
 from ros_pad.errors import InvalidInput
 from ros_pad.signals import INTERRUPTED
-from ros_pad.trials.sweep import Sweep
-from ros_pad.trials.sweep.execution import run_job
-from ros_pad.trials.sweep.table import Results, write_tables
 
 CAP = 300.0  # s: no test waits longer for an event, however slow the machine
 LEG = ['sweep', 'leg_wet_flat', '--workers', '2', '--set', 'cycles=2']
@@ -71,23 +67,6 @@ def test_ranges_that_make_no_sense_are_refused(text, message):
 def test_seeds_that_make_no_sense_are_refused(text):
     with pytest.raises(InvalidInput, match='--seed'):
         seeds(text)
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'parts'),
-    [
-        (['leg_wet_fla'], ["'leg_wet_fla'", "Did you mean 'leg_wet_flat'"]),
-        (['leg_wet_flat', '--workers', '0'], ['workers = 0 is not allowed']),
-    ],
-)
-def test_bad_input_is_refused_before_anything_runs(arguments, parts, tmp_path, capsys):
-    out = tmp_path / 'sweep'
-    assert cli.main(['sweep', *arguments, '--out', str(out)]) == 2
-    said = capsys.readouterr()
-    for part in parts:
-        assert part in said.err
-    assert said.out == ''
-    assert not out.exists()
 
 
 def nothing_to_do(jobs, workers):
@@ -156,16 +135,16 @@ class Child:
 
     def until(self, more):
         """Wait until the progress bar shows ``more`` trials above its first count."""
-        first = None
-        deadline = time.monotonic() + CAP
-        while True:
-            assert self.process.poll() is None and time.monotonic() < deadline, self.said()
-            shown = [int(each) for each in re.findall(r'(\d+)/\d+ trials', self.said())]
+        shown = []
+
+        def reached():
+            assert self.process.poll() is None, self.said()
             # The bar shows 0 until the trials that are already done are counted.
-            first = first or next((each for each in shown if each), None)
-            if first is not None and shown[-1] >= first + more:
-                break
-            time.sleep(0.02)
+            shown.extend(int(each) for each in re.findall(r'(\d+)/\d+ trials', self.said()))
+            counted = [each for each in shown if each]
+            return counted and counted[-1] >= counted[0] + more
+
+        wait_for(reached, 'trials')
         self.workers = children(self.process.pid)
 
     def said(self):
@@ -190,47 +169,7 @@ def alive(pid):
 
 def check_they_end(pids):
     """Check that the workers end after the sweep has ended."""
-    deadline = time.monotonic() + CAP
-    while any(alive(pid) for pid in pids):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-ROWS = "SELECT row FROM trial WHERE key != 'about' ORDER BY rowid"
-
-
-@pytest.mark.slow
-def test_a_killed_sweep_goes_on_and_loses_and_doubles_nothing(tmp_path):
-    """A sweep that is killed twice and then finished has the rows of one that was not killed."""
-    arguments = [*LEG, '--seed', '0:11', '--set', 'body.rolling_drag=0.5,1']
-    out = tmp_path / 'killed'
-    kept: list[list[str]] = []
-    for more in (1, 4):
-        child = Child([*arguments, '--out', str(out)], tmp_path)
-        try:
-            child.until(more)
-        finally:
-            child.process.kill()
-            child.process.wait()
-        base = sqlite3.connect(out / 'trials.sqlite')
-        kept.append([row for (row,) in base.execute(ROWS)])
-        base.close()
-        check_they_end(child.workers)
-    assert 0 < len(kept[0]) < len(kept[1]) < 24
-    assert kept[1][: len(kept[0])] == kept[0]  # no finished trial is repeated
-    assert cli.main([*arguments, '--out', str(out)]) == 0
-    plan = Sweep(
-        ['leg_wet_flat'],
-        seeds=seeds('0:11'),
-        parameters={'cycles': [2], 'body.rolling_drag': [0.5, 1]},
-    )
-    with Results(tmp_path / 'whole', {}, []) as results:
-        for job in plan.jobs():
-            results.add(job.key, run_job(job))
-        write_tables(results.rows(job.key for job in plan.jobs()), tmp_path / 'whole')
-    rows = table(out)
-    assert len(rows) == 24
-    assert rows == table(tmp_path / 'whole')
+    wait_for(lambda: not any(alive(pid) for pid in pids))
 
 
 @pytest.mark.slow

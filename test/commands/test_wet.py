@@ -4,24 +4,22 @@
 import dataclasses
 import json
 import math
-import pathlib
 
-import numpy as np
 import pytest
 
 from ros_pad import cli, configuration
-from ros_pad.capillary import Mesh, Wall, bath_meniscus, wet, wet_pattern, wet_surface
+from ros_pad.capillary import Mesh, Wall, bath_meniscus, wet, wet_pattern
 from ros_pad.contact import THESIS_LIQUID, WATER
 
 DOME = ['wet', 'dome', '--radius', '1.55e-3', '--contact-radius', '0.6e-3']
 
 
-def asked(arguments: list[str], capsys: pytest.CaptureFixture[str], status: int = 0) -> dict:
+def asked(arguments, capsys, status=0):
     assert cli.main([*arguments, '--json']) == status
     return json.loads(capsys.readouterr().out)
 
 
-def test_a_dome_in_json_is_the_result_in_python(capsys: pytest.CaptureFixture[str]):
+def test_a_dome_in_json_is_the_result_in_python(capsys):
     values = asked([*DOME, '--direction', '30', '--balance', 'force'], capsys)
     found = wet(Mesh.dome(1.55e-3, 0.6e-3), WATER, 'force')
     assert values['status'] == 'ok'
@@ -35,7 +33,7 @@ def test_a_dome_in_json_is_the_result_in_python(capsys: pytest.CaptureFixture[st
     assert values['pressure_pa'] == pytest.approx(found.pressure.mean())
 
 
-def test_a_dome_for_the_reader(capsys: pytest.CaptureFixture[str]):
+def test_a_dome_for_the_reader(capsys):
     assert cli.main([*DOME, '--liquid', 'thesis', '--layers', '50']) == 0
     said = capsys.readouterr().out
     found = wet(Mesh.dome(1.55e-3, 0.6e-3), THESIS_LIQUID, layers=50)
@@ -44,7 +42,7 @@ def test_a_dome_for_the_reader(capsys: pytest.CaptureFixture[str]):
     assert 'contact angle     77.3493 °' in said
 
 
-def test_other_shapes_and_many_pads(capsys: pytest.CaptureFixture[str]):
+def test_other_shapes_and_many_pads(capsys):
     cone = ['wet', 'cone', '--contact-radius', '1e-3', '--top-radius', '2e-3', '--height', '4e-3']
     assert asked(cone, capsys)['height_m'] > 0.0
     cylinder = ['wet', 'cylinder', '--radius', '0.5e-3', '--height', '0.04', '--angle', '0']
@@ -72,7 +70,7 @@ def test_other_shapes_and_many_pads(capsys: pytest.CaptureFixture[str]):
         assert values['capillary_force_n'] == pytest.approx(-found.force / 7, rel=1e-9)
 
 
-def test_least_energy_around_one_pad(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+def test_least_energy_around_one_pad(tmp_path, capsys):
     asked_for = [*DOME, '--method', 'energy', '--hysteresis', '100', '60']
     figure = tmp_path / 'it.png'
     values = asked([*asked_for, '--figure', str(figure)], capsys)
@@ -86,36 +84,14 @@ def test_least_energy_around_one_pad(tmp_path: pathlib.Path, capsys: pytest.Capt
     assert figure.read_bytes().startswith(b'\x89PNG')
 
 
-@pytest.mark.slow
-def test_least_energy_between_many_pads_and_off_the_origin(
-    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
-):
-    sizes = ['--radius', '1.55e-3', '--contact-radius', '0.6e-3', '--height', '2.6e-3']
-    pattern = ['wet', 'pattern', '--pads', '19', '--pitch', '4.4e-3', *sizes, '--method', 'energy']
-    values = asked(pattern, capsys)
-    area = math.sqrt(0.75) * 4.4e-3**2
-    exact = wet_surface(Wall.dome(1.55e-3, 0.6e-3, 2.6e-3), WATER, area)
-    assert values['pull_n'] == pytest.approx(-exact.force[2], rel=5e-3)
-    assert values['capillary_force_n'] is None
-    mesh = Mesh.dome(1.55e-3, 0.6e-3, 2.6e-3)
-    moved = Mesh(mesh.points + np.array([3e-3, -1e-3, 0.0]), mesh.faces)
-    found = wet_surface(moved, WATER, area)
-    assert found.mean_height == pytest.approx(values['height_m'], rel=1e-4)
-    assert found.line[:, :2].mean(axis=0) == pytest.approx([3e-3, -1e-3], abs=1e-6)
-
-
-def test_least_energy_without_an_answer(capsys: pytest.CaptureFixture[str]):
+def test_least_energy_without_an_answer(capsys):
     low = ['wet', 'cylinder', '--radius', '1e-3', '--height', '1e-3', '--angle', '0']
     assert cli.main([*low, '--method', 'energy']) == 1
     assert 'status rim: the liquid reaches the top' in capsys.readouterr().err
-    assert cli.main([*DOME, '--method', 'energy', '--area', '7e-6']) == 2
-    assert 'area = 7e-06' in capsys.readouterr().err
-    assert cli.main([*DOME, '--method', 'energy', '--layers', '50']) == 2
-    assert '--layers is only for --method layers' in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_a_foot_takes_the_force(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+def test_a_foot_takes_the_force(tmp_path, capsys):
     force = asked([*DOME, '--hysteresis', '100', '60'], capsys)['capillary_force_n']
     shipped = configuration.locate('feet', 'large37').read_text()
     foot = tmp_path / 'wetter.yaml'
@@ -139,9 +115,7 @@ def test_a_foot_takes_the_force(tmp_path: pathlib.Path, capsys: pytest.CaptureFi
         (['--area', '1e-3', '--pads', '7'], 'far_apart', '--method energy'),
     ],
 )
-def test_no_answer_is_a_failure_with_advice(
-    options: list[str], name: str, advice: str, capsys: pytest.CaptureFixture[str]
-):
+def test_no_answer_is_a_failure_with_advice(options, name, advice, capsys):
     assert cli.main([*DOME, *options, '--json']) == 1
     said = capsys.readouterr()
     values = json.loads(said.out)
@@ -152,30 +126,7 @@ def test_no_answer_is_a_failure_with_advice(
     assert 'no answer' in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'part'),
-    [
-        (['wet', 'dome'], 'a dome needs --radius --contact-radius'),
-        ([*DOME, '--top-radius', '1'], '--top-radius is no option of the mesh dome'),
-        ([*DOME, '--scale', '1'], '--scale is no option of the mesh dome'),
-        ([*DOME, '--pads', '3'], '--pads needs --area'),
-        ([*DOME, '--area', '1', '--hysteresis', '90', '60'], '--hysteresis is for a single pad'),
-        ([*DOME, '--hysteresis', '60', '90'], 'advancing_angle - receding_angle'),
-        ([*DOME, '--area', '1e-3', '--pads', '0'], 'pads = 0'),
-        ([*DOME, '--tension', '0.05'], '--tension needs --angle'),
-        ([*DOME, '--layers', '1'], 'layers = 1'),
-        ([*DOME, '--direction', 'nan'], '--direction = nan'),
-        ([*DOME, '--figure', 'dome.jpg'], "'.jpg' is not allowed"),
-        (['wet', 'none.stl'], 'none.stl: no such file'),
-        (['wet', 'none.stl', '--height', '1'], '--height is no option of the mesh none.stl'),
-    ],
-)
-def test_bad_input_is_named(arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(arguments) == 2
-    assert part in capsys.readouterr().err
-
-
-def test_a_file_in_millimetres(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+def test_a_file_in_millimetres(tmp_path, capsys):
     pytest.importorskip('meshio')
     path = tmp_path / 'dome.stl'
     small = Mesh.dome(1.55e-3, 0.6e-3)

@@ -2,7 +2,6 @@
 """Numerical checks of steps in docs/derivation.md, by other methods than those of the code."""
 
 import math
-from collections.abc import Callable
 
 import mpmath
 import numpy as np
@@ -23,14 +22,14 @@ def _digits():
         yield
 
 
-def cut_sphere(height: mpf, depth: mpf) -> tuple[mpf, mpf]:
+def cut_sphere(height, depth):
     """Return area, contact disc included, and volume of a spherical dome, by quadrature.
 
     The sphere goes through the rim and has the given height; the floor cuts ``depth`` off.
     """
     sphere = (R * R + height * height) / (2 * height)
 
-    def section(z: mpf) -> mpf:
+    def section(z):
         return sphere**2 - (z - height + sphere) ** 2
 
     gap = height - depth
@@ -42,13 +41,13 @@ def cut_sphere(height: mpf, depth: mpf) -> tuple[mpf, mpf]:
     return wall + mp.pi * section(gap), volume
 
 
-def tension_energy(area: mpf) -> mpf:
+def tension_energy(area):
     """Return the work, J, that stretches the flat pad to an area S against 1.5 k √(S/S₀) - k."""
     flat = mp.pi * R * R
     return mpmath.quad(lambda s: K * (mpf(3) / 2 * mp.sqrt(s / flat) - 1), [flat, area])
 
 
-def printed_work(height: mpf, depth: mpf, contact: mpf, pressure: mpf) -> mpf:
+def printed_work(height, depth, contact, pressure):
     """Return W_F, J, as printed before equation 3.44, with the appendix' sign of adhesion."""
     side = R * R + height**2 - depth**2
     return (
@@ -61,8 +60,8 @@ def printed_work(height: mpf, depth: mpf, contact: mpf, pressure: mpf) -> mpf:
 
 
 @pytest.mark.parametrize('pressure', PRESSURES)
-def test_free_dome_is_where_the_energy_is_least(pressure: float):
-    def energy(height: mpf) -> mpf:
+def test_free_dome_is_where_the_energy_is_least(pressure):
+    def energy(height):
         area, volume = cut_sphere(height, mpf(0))
         return tension_energy(area) - pressure * volume
 
@@ -75,12 +74,12 @@ def test_free_dome_is_where_the_energy_is_least(pressure: float):
 
 @pytest.mark.parametrize('pressure', PRESSURES)
 @pytest.mark.parametrize('share', [1e-6, 0.05, 0.4, 0.8, 0.95])
-def test_both_balances_from_the_work(pressure: float, share: float):
+def test_both_balances_from_the_work(pressure, share):
     force = share * pressure * math.pi * 1.5e-3**2
     dome = press(LARGE_PAD, pressure, force)
     shape = (mpf(dome.height), mpf(dome.depth), mpf(dome.contact_radius))
 
-    def partial(*order: int) -> mpf:
+    def partial(*order):
         return mpmath.diff(lambda *at: printed_work(*at, mpf(pressure)), shape, order)
 
     # Equation 3.57: the derivative by depth less that by height, at constant contact radius.
@@ -98,7 +97,7 @@ def test_both_balances_from_the_work(pressure: float, share: float):
 # --- the branch ----------------------------------------------------------------------------------
 
 
-def balance(x: np.ndarray, depth: np.ndarray, tension: float, a: float) -> np.ndarray:
+def balance(x, depth, tension, a):
     """Return the residual of equation 3.58 with the force of 3.53; it is zero in equilibrium."""
     rho = 0.5 * (x + 1 / x)
     sigma = np.sqrt(1 + (x - depth) * (x + depth))
@@ -106,13 +105,13 @@ def balance(x: np.ndarray, depth: np.ndarray, tension: float, a: float) -> np.nd
     return (x + depth) * (tension * rho - 3 * sigma + 2) - force
 
 
-def certificate(x: np.ndarray, depth: np.ndarray, tension: float) -> np.ndarray:
+def certificate(x, depth, tension):
     rho = 0.5 * (x + 1 / x)
     sigma = np.sqrt(1 + (x - depth) * (x + depth))
     return tension * (rho - 2 * depth) + 3 * sigma - 2 - 3 * depth * (x + depth) / sigma
 
 
-def halved(falls: Callable[[np.ndarray], np.ndarray], high: np.ndarray) -> np.ndarray:
+def halved(falls, high):
     """Return the zero, from 0 to ``high``, of a function that is positive at 0, by bisection."""
     low = np.zeros_like(high)
     for _ in range(70):
@@ -122,7 +121,7 @@ def halved(falls: Callable[[np.ndarray], np.ndarray], high: np.ndarray) -> np.nd
     return low
 
 
-def branch(tension: float, a: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def branch(tension, a):
     """Return heights over radius, whether each has a certified equilibrium, and forces."""
     free = math.tan(
         float(mpmath.findroot(lambda t: 6 * mp.sin(t) - 2 * mp.sin(2 * t) - tension, tension / 4))

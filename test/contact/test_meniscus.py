@@ -106,16 +106,6 @@ def test_contact_angle():
     np.testing.assert_allclose(np.cos(angles), 2 * np.sqrt([0.3, 0.5, 0.9]) - 1, rtol=1e-13)
 
 
-def test_bad_calls():
-    dome = press(LARGE_PAD, 75e3, 0.3)
-    with pytest.raises(InvalidInput, match='corrected, thesis'):
-        meniscus(dome, WATER, 'printed')
-    with pytest.raises(InvalidInput, match='contact_angle'):
-        meniscus(dome, Liquid(0.073, 0.027, contact_angle=2.8))
-    with pytest.raises(InvalidInput, match=r'up to 0\.0054'):
-        capillary_pull(1e-3, 6e-3, WATER)
-
-
 def test_hysteresis_force():
     # Water on a disc of 0.8 mm, with cosines that differ by 0.5: 0.06 mN.
     force = hysteresis_force(0.8e-3, 0.073, 2 * math.pi / 3, math.pi / 2)

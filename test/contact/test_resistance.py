@@ -189,24 +189,6 @@ def test_bad_files(tmp_path, key, value, message):
     assert str(path) in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    'key, value',
-    [
-        ('radius', 0),
-        ('stiffness', -40),
-        ('adhesion_energy', 0.9),
-        ('thickness', 0.4),
-        ('thickness', 2e-3),
-        ('Radius', 1),
-    ],
-)
-def test_bad_pads_in_files(tmp_path, key, value):
-    path = written(tmp_path, lambda values: values['pad'].update({key: value}))
-    with pytest.raises(ConfigError, match=key) as caught:
-        Foot.load(path)
-    assert str(path) in str(caught.value)
-
-
 def test_the_measured_line_is_of_one_pad(tmp_path):
     path = written(tmp_path, lambda values: values['pad'].update(stiffness=44.0))
     with pytest.raises(ConfigError, match=r'no force limit was measured on it.*one of thickness'):

@@ -312,12 +312,6 @@ def test_estimates_are_finite_whatever_comes(samples):
 # --- settings ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('value', [0.0, math.nan, 'heavy'])
-def test_bad_expected_loads_are_refused(value):
-    with pytest.raises(InvalidInput, match='expected_load'):
-        FootEstimator(FOOT, value)
-
-
 @pytest.mark.parametrize('name', [field.name for field in dataclasses.fields(Tuning)])
 @pytest.mark.parametrize('value', [-1.0, math.nan, 'much'])
 def test_bad_tuning_is_named(name, value):

@@ -6,12 +6,10 @@ them at the end. ``until(predicate)`` spins the executor until the predicate hol
 test after a timeout. ``bench`` hands messages to nodes without DDS: see helpers.py.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
@@ -24,13 +22,14 @@ os.environ.setdefault('ROS_LOG_DIR', tempfile.mkdtemp(prefix='ros_pad_log_'))
 
 rclpy = pytest.importorskip('rclpy', reason='the node tests need ROS 2')
 
-from helpers import Bench, wait_for  # noqa: E402
+from helpers import Bench  # noqa: E402
+from shared import wait_for  # noqa: E402
 
 Until = Callable[..., None]
 
 
 @pytest.fixture
-def context() -> Iterator[rclpy.Context]:
+def context():
     context = rclpy.Context()
     rclpy.init(context=context)
     yield context
@@ -41,7 +40,7 @@ def context() -> Iterator[rclpy.Context]:
 
 
 @pytest.fixture
-def executor(context: rclpy.Context) -> Iterator[rclpy.executors.Executor]:
+def executor(context):
     from rclpy.executors import SingleThreadedExecutor
 
     executor = SingleThreadedExecutor(context=context)
@@ -52,10 +51,8 @@ def executor(context: rclpy.Context) -> Iterator[rclpy.executors.Executor]:
 
 
 @pytest.fixture
-def until(executor: rclpy.executors.Executor) -> Until:
-    def until(
-        predicate: Callable[[], object], timeout: float = 60.0, what: str = 'the condition'
-    ) -> None:
+def until(executor):
+    def until(predicate, timeout=60.0, what='the condition'):
         wait_for(predicate, what, lambda: executor.spin_once(timeout_sec=0.01), timeout)
 
     return until

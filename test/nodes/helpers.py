@@ -6,10 +6,7 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
-import time
 from collections import defaultdict
-from collections.abc import Callable
-from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PointStamped, WrenchStamped
@@ -21,13 +18,9 @@ from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Header
 
 from ros_pad.bags import topics
-from ros_pad.bags.topics import Topic
 from ros_pad.bags.wire import Wire, legs_of
-from ros_pad.errors import TransportError
 from ros_pad.nodes.qos import message_class
-from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind, split
-from ros_pad.regulators import Reading
-from ros_pad.regulators.protocol import permitted
+from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, split
 
 MS = 1_000_000
 SECOND = 1_000 * MS
@@ -41,34 +34,25 @@ LOAD = 6.83
 """Load of a foot in stance, N."""
 
 
-def wait_for(condition, what='the condition', turn=lambda: time.sleep(0.01), seconds=60.0):
-    """Call ``turn`` until a condition holds, and return what it is; fail after some seconds."""
-    deadline = time.monotonic() + seconds
-    while not (found := condition()):
-        assert time.monotonic() < deadline, f'waited for {what}: timeout after {seconds:g} s'
-        turn()
-    return found
-
-
-def start_node(name: str, *parameters: str) -> subprocess.Popen[str]:
+def start_node(name, *parameters):
     """Start a node in a process of its own, with parameters such as ``legs:=[1]``."""
     given = [word for each in parameters for word in ('-p', each)]
     command = [sys.executable, '-m', 'ros_pad.nodes.start', name, '--ros-args', *given]
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
 
-def node_class(name: str) -> Any:
+def node_class(name):
     """Return the class of a node, whose module has its parameters."""
     module = importlib.import_module(f'ros_pad.nodes.{name}')
     return getattr(module, f'{name.title().replace("_", "")}Node')
 
 
-def nanoseconds(stamp: Time) -> int:
+def nanoseconds(stamp):
     """Return a stamp in ns."""
     return stamp.sec * SECOND + stamp.nanosec
 
 
-def record(kind: Kind, stamp_ns: int, legs: int = 2, **fields: Any) -> Block:
+def record(kind, stamp_ns, legs=2, **fields):
     """Return a record; a field has a value for all legs, or one for each; others are missing."""
     rows = kind.rows(legs)
     for name, value in fields.items():
@@ -76,30 +60,30 @@ def record(kind: Kind, stamp_ns: int, legs: int = 2, **fields: Any) -> Block:
     return Block.of(stamp_ns, rows)
 
 
-def sample(stamp_ns: int, force=(0.0, 0.0, LOAD), position=(0.0, 0.0, 0.0), **more) -> Block:
+def sample(stamp_ns, force=(0.0, 0.0, LOAD), position=(0.0, 0.0, 0.0), **more):
     return record(SAMPLE, stamp_ns, force=force, position=position, **more)
 
 
-def estimate(stamp_ns: int, load=LOAD, wetness=0.5, position=(0.0, 0.0), **more) -> Block:
+def estimate(stamp_ns, load=LOAD, wetness=0.5, position=(0.0, 0.0), **more):
     """Return an estimate of an observable foot in stance."""
     fields = {'load': load, 'wetness': wetness, 'position': position, 'friction': 0.5}
     return record(ESTIMATE, stamp_ns, **(fields | {'doubt': 0.0, 'detail': 0.0} | more))
 
 
-def command(stamp_ns: int, setpoint, **more) -> Block:
+def command(stamp_ns, setpoint, **more):
     return record(COMMAND, stamp_ns, setpoint=setpoint, dome=1.0, **more)
 
 
-def pressure(stamp_ns: int, gauge, **more) -> Block:
+def pressure(stamp_ns, gauge, **more):
     return record(PRESSURE, stamp_ns, pressure=gauge, **more)
 
 
-def header(stamp_ns: int, frame: str = '') -> Header:
+def header(stamp_ns, frame=''):
     seconds, rest = split(stamp_ns)
     return Header(stamp=Time(sec=seconds, nanosec=rest), frame_id=frame)
 
 
-def wrench(stamp_ns: int, force=(0.0, 0.0, LOAD), moment=0.0, frame='') -> WrenchStamped:
+def wrench(stamp_ns, force=(0.0, 0.0, LOAD), moment=0.0, frame=''):
     message = WrenchStamped(header=header(stamp_ns, frame))
     f = message.wrench.force
     f.x, f.y, f.z = map(float, force)
@@ -107,25 +91,25 @@ def wrench(stamp_ns: int, force=(0.0, 0.0, LOAD), moment=0.0, frame='') -> Wrenc
     return message
 
 
-def position(stamp_ns: int, point=(0.0, 0.0, 0.0), frame='') -> PointStamped:
+def position(stamp_ns, point=(0.0, 0.0, 0.0), frame=''):
     message = PointStamped(header=header(stamp_ns, frame))
     p = message.point
     p.x, p.y, p.z = map(float, point)
     return message
 
 
-def fluid(stamp_ns: int, gauge: float, frame='') -> FluidPressure:
+def fluid(stamp_ns, gauge, frame=''):
     return FluidPressure(header=header(stamp_ns, frame), fluid_pressure=gauge + AMBIENT)
 
 
-def decoded(topic: Topic, data: bytes) -> Any:
+def decoded(topic, data):
     """Return the block or message in bytes."""
     if topic in topics.RECORDS:
         return Wire(topic.record, legs_of(data)).decode(data)
     return deserialize_message(data, message_class(topic.type_name))
 
 
-def encoded(topic: Topic, content: Any, legs: Any) -> bytes:
+def encoded(topic, content, legs):
     """Return the bytes of a block of records of these legs, or of a message."""
     if isinstance(content, bytes):
         return content
@@ -134,55 +118,16 @@ def encoded(topic: Topic, content: Any, legs: Any) -> bytes:
     return serialize_message(content)
 
 
-def overrides(values: dict[str, Any]) -> list[Parameter]:
+def overrides(values):
     return [Parameter(name, value=value) for name, value in values.items()]
 
 
-def deliver(node: Node, name: str, data: bytes) -> None:
+def deliver(node, name, data):
     """Call a node's subscriptions to a topic, as an executor does."""
     found = [each for each in node.subscriptions if each.topic_name == '/' + name.lstrip('/')]
     assert found, f'{node.get_name()} does not subscribe to {name}'
     for each in found:
         each.callback(data if each.raw else deserialize_message(data, each.msg_type))
-
-
-class Device:
-    """A device that keeps what it received; its cable may break."""
-
-    made: tuple[Device, ...] = ()
-
-    def __init__(self, ceiling, port='usb', clock=None, pad_volume=0.0):
-        self.ceiling, self.port = ceiling, port
-        self.setpoint, self.received = 40e3, []  # of an earlier user
-        self.is_open = False
-        self.broken = None  # error with which its answers are lost
-        Device.made = (*Device.made, self)
-
-    def open(self):
-        if self.port == 'none':
-            raise TransportError("no such port: 'none'")
-        self.is_open = True
-
-    def set_pressure(self, gauge_pa):
-        self.received.append(gauge_pa)
-        self.setpoint = permitted(gauge_pa, self.ceiling)
-        self._answer()
-
-    def read(self):
-        self._answer()
-        return Reading(self.setpoint, self.setpoint, (), 0.0)
-
-    def vent(self):
-        self._answer()
-        self.setpoint = 0.0
-
-    def close(self):
-        self.is_open = False
-
-    def _answer(self):
-        assert self.is_open
-        if self.broken:
-            raise self.broken
 
 
 class Bench:
@@ -198,7 +143,7 @@ class Bench:
         Simulated time, ns.
     """
 
-    def __init__(self, context, executor, until, monkeypatch) -> None:
+    def __init__(self, context, executor, until, monkeypatch):
         self._context, self._executor, self.until = context, executor, until
         self.nodes: list[Node] = []
         self.sent: dict[str, list[bytes]] = defaultdict(list)
@@ -206,13 +151,13 @@ class Bench:
         self.legs: tuple[int, ...] = (1, 2)
         monkeypatch.setattr(Publisher, 'publish', lambda *given: self._keep(*given))
 
-    def _keep(self, publisher: Publisher, message: Any) -> None:
+    def _keep(self, publisher, message):
         if publisher.topic_name == '/parameter_events':  # with the time of day
             return
         data = message if isinstance(message, bytes) else serialize_message(message)
         self.sent[publisher.topic_name].append(data)
 
-    def start(self, kind: Callable[..., Any], **parameters: Any) -> Any:
+    def start(self, kind, **parameters):
         """Start a node, unless told otherwise with legs 1 and 2 and in simulated time."""
         values = {'use_sim_time': True, 'legs': list(self.legs)} | parameters
         self.legs = tuple(values['legs'])
@@ -221,41 +166,41 @@ class Bench:
         self.nodes.append(self.node)
         return self.node
 
-    def stop(self) -> None:
+    def stop(self):
         """Destroy the node that was started last."""
         self._executor.remove_node(self.node)
         self.nodes.remove(self.node)
         self.node.destroy_node()
 
-    def give(self, topic: Topic, content: Any, leg: int | None = None) -> None:
+    def give(self, topic, content, leg=None):
         """Hand bytes, a message or records to the nodes that subscribe to a topic."""
         name = topic.name(leg)
         for node in self.nodes:
             if any(each.topic_name == '/' + name.lstrip('/') for each in node.subscriptions):
                 deliver(node, name, encoded(topic, content, self.legs))
 
-    def tick(self, seconds: float = 0.01) -> None:
+    def tick(self, seconds=0.01):
         """Advance simulated time in steps of 10 ms."""
         for _ in range(round(seconds / 0.01)):
             self.clock(self.now_ns + 10 * MS)
 
-    def clock(self, now_ns: int) -> None:
+    def clock(self, now_ns):
         """Set the simulated time, ns."""
         self.now_ns = now_ns
         message = message_class(topics.CLOCK.type_name)()
         message.clock = header(now_ns).stamp
         self.give(topics.CLOCK, message)
 
-    def heard(self, topic: Topic, leg: int | None = None) -> list[Any]:
+    def heard(self, topic, leg=None):
         """Return what was published on a topic: blocks or messages."""
         name = '/' + topic.name(leg).lstrip('/')
         return [decoded(topic, data) for data in self.sent.get(name, ())]
 
-    def last(self, topic: Topic) -> Any:
+    def last(self, topic):
         """Return the rows of the last record of a topic."""
         return self.heard(topic)[-1].rows[-1]
 
-    def statuses(self, name: str = '') -> list[tuple[float, Any]]:
+    def statuses(self, name=''):
         """Return the statuses with a name on /diagnostics, each with its time, s."""
         return [
             (nanoseconds(array.header.stamp) * 1e-9, status)
@@ -264,11 +209,11 @@ class Bench:
             if name in status.name
         ]
 
-    def call(self, name: str, request: Any) -> Any:
+    def call(self, name, request):
         """Call a service of the node that was started last."""
         (service,) = [each for each in self.node.services if each.srv_name.endswith(name)]
         return service.callback(request, service.srv_type.Response())
 
-    def set(self, name: str, value: Any) -> Any:
+    def set(self, name, value):
         """Change a parameter; return the result."""
         return self.node.set_parameters([Parameter(name, value=value)])[0]

@@ -10,12 +10,13 @@ import signal
 import numpy as np
 import pytest
 import rclpy
-from helpers import MS, SIX, pressure, wait_for
+from helpers import MS, SIX, pressure
 from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
+from shared import wait_for
 
 from ros_pad import cli, configuration, trials
 from ros_pad.bags import BagReader, BagWriter

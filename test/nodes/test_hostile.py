@@ -13,7 +13,6 @@ from geometry_msgs.msg import TwistWithCovarianceStamped
 from helpers import (
     MS,
     SECOND,
-    Device,
     command,
     encoded,
     estimate,
@@ -30,6 +29,7 @@ from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import FluidPressure, JointState
+from shared import Device
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
@@ -193,6 +193,16 @@ class Rig:
         if device := self.device(leg):
             device.broken = TransportError('cable') if broken else None
 
+    def gauge(self, leg, value):
+        """Let a device read a pressure, and read it."""
+        if device := self.device(leg):
+            device.reads = value
+            channel = self.node.supervision.channels[leg - 1]
+            pressure = channel.read(self.time_ns)
+            assert pressure is None or math.isfinite(pressure)
+            if pressure is not None and pressure > 1.02 * CEILING:
+                assert channel.held and device.setpoint == 0.0
+
     def check(self):
         for device in Device.made:
             assert all(math.isfinite(each) and 0.0 <= each <= CEILING for each in device.received)
@@ -217,6 +227,7 @@ ACTIONS = st.one_of(
     action('set', st.sampled_from(['command_timeout', 'ceiling']), numbers),
     action('set', st.just('on_fault'), st.sampled_from(['report', 'vent', 'x'])),
     action('cable', legs, st.booleans()),
+    action('gauge', legs, st.one_of(st.none(), numbers, st.floats(0.0, 1.1 * CEILING))),
 )
 
 
@@ -236,6 +247,7 @@ def test_no_sequence_of_messages_passes_the_ceiling_or_stops_the_timeout(rig):
             getattr(rig, name)(*arguments)
         for leg in LEGS:
             rig.cable(leg, broken=False)
+            rig.gauge(leg, None)
         # Time goes on, whatever stamps came.
         rig.time_ns = min(rig.time_ns, LAST_NS - rig.timeout_ns - SECOND)
         rig.tick(rig.timeout_ns + 200 * MS)
@@ -243,8 +255,8 @@ def test_no_sequence_of_messages_passes_the_ceiling_or_stops_the_timeout(rig):
         assert all(
             device.setpoint == 0.0 for device in Device.made if rig.node.supervision.channels
         )
-        rig.transit('configure')
-        rig.transit('activate')
+        for name in ('deactivate', 'configure', 'activate'):
+            rig.transit(name)
         if rig.time_ns < LAST_NS - SECOND:
             rig.tick(200 * MS)
             rig.send_now(30e3, NAN)

@@ -7,7 +7,6 @@ import dataclasses
 import json
 import pathlib
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -32,7 +31,7 @@ RVIZ_TYPES = {
 
 
 @pytest.fixture(scope='module')
-def bag(tmp_path_factory: pytest.TempPathFactory) -> BagReader:
+def bag(tmp_path_factory):
     folder = tmp_path_factory.mktemp('walk') / 'bag'
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=2)
     composed.run(scene, fidelity='L1', bag=folder)
@@ -40,25 +39,25 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> BagReader:
 
 
 @pytest.fixture(scope='module')
-def messages(bag: BagReader) -> dict[str, list[Any]]:
+def messages(bag):
     found: dict[str, list[Any]] = {}
     for name, message, _ in bag.messages():
         found.setdefault(name, []).append(message)
     return found
 
 
-def panels(kind: str) -> Iterator[tuple[str, dict[str, Any]]]:
+def panels(kind):
     for name, config in LAYOUT['configById'].items():
         if name.startswith(f'{kind}!'):
             yield name, config
 
 
-def plain(value: Any) -> Any:
+def plain(value):
     """Return a byte as a number, as viewers read it."""
     return int.from_bytes(value) if isinstance(value, bytes) else value
 
 
-def values(path: str, messages: dict[str, list[Any]]) -> list[Any]:
+def values(path, messages):
     """Return the values of a message path in all messages of the bag."""
     match = re.fullmatch(r'((?:/\w+)+)((?:\.\w+(?:\[(?::|\d+)\])?(?:\{\w+[!=]=\d+\})?)*)', path)
     assert match, f'{path} is no message path'
@@ -88,7 +87,7 @@ PLOTTED = {
 }  # fmt: skip
 
 
-def test_every_plotted_path_is_a_number_in_the_bag(messages: dict[str, list[Any]]):
+def test_every_plotted_path_is_a_number_in_the_bag(messages):
     for name, config in panels('Plot'):
         axis = [config['xAxisPath']] if config['xAxisVal'] == 'custom' else []
         assert config['paths'] and config['yAxisLabel'], name
@@ -98,9 +97,9 @@ def test_every_plotted_path_is_a_number_in_the_bag(messages: dict[str, list[Any]
 
 
 def test_the_places_of_numbers_of_records_are_those_of_their_names(
-    messages: dict[str, list[Any]],
+    messages,
 ):
-    def named(path: dict[str, Any]) -> str:
+    def named(path):
         topic, _, place = path['value'].removesuffix(']').partition('.position[')
         (names,) = {tuple(each.name) for each in messages[topic]}
         return names[int(place)]
@@ -118,9 +117,7 @@ def test_the_places_of_numbers_of_records_are_those_of_their_names(
     assert set(shown) == {'Plot!path'}
 
 
-def test_what_is_drawn_is_in_the_bag_and_in_the_fixed_frame(
-    bag: BagReader, messages: dict[str, list[Any]]
-):
+def test_what_is_drawn_is_in_the_bag_and_in_the_fixed_frame(bag, messages):
     ((_, config),) = panels('3D')
     assert config['followTf'] == 'world'
     assert set(config['topics']) == {'/markers', '/body/pose', OF_VIEWS}
@@ -131,7 +128,7 @@ def test_what_is_drawn_is_in_the_bag_and_in_the_fixed_frame(
     assert frames == {'world'} == {RVIZ['Visualization Manager']['Global Options']['Fixed Frame']}
 
 
-def test_rviz_shows_topics_of_the_bag(bag: BagReader):
+def test_rviz_shows_topics_of_the_bag(bag):
     displays = RVIZ['Visualization Manager']['Displays']
     shown = {each['Topic']['Value']: each for each in displays if 'Topic' in each}
     # Names are relative, so that a namespace applies to rviz2 as to the nodes.

@@ -60,9 +60,3 @@ def test_wet_ground_is_drawn_where_it_is_wet_and_nowhere_else():
     for column, row in itertools.product(range(-20, 20), range(-10, 10)):
         wet = floor.wet((column + 0.5) * CELL, (row + 0.5) * CELL)
         assert ((column, row) in drawn_at) == wet
-
-
-def test_floor_comes_once_a_second():
-    walk = walked('hexapod_smooth_dry_flat', 4.0)
-    times = [robot.time for _, _, robot, drawn in walk if ('wet ground', 0) in drawn]
-    assert times == pytest.approx([DT, 1.004, 2.004, 3.004])

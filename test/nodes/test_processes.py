@@ -13,9 +13,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rclpy
-from helpers import SIX, start_node, wait_for
+from helpers import SIX, start_node
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from shared import wait_for
 
 from ros_pad.bags import BagReader, topics
 from ros_pad.bags.wire import Wire

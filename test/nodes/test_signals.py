@@ -10,7 +10,7 @@ import sys
 import time
 
 import pytest
-from helpers import wait_for
+from shared import wait_for
 
 from ros_pad.bags import BagReader
 

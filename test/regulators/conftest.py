@@ -8,28 +8,16 @@ import select
 import struct
 import termios
 import threading
-import time
 import tty
-from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
+from shared import wait_for
 
 from ros_pad.errors import PadError
 from ros_pad.regulators import Regulator, create
 from ros_pad.regulators.emulate import EMULATORS, Emulator
 
-LIMIT = 60.0  # s, enough on slow machines
 PATIENT = {'reply_timeout': 1.0, 'silence': 5.0}  # s: slow machines must not lose devices
-
-
-def wait_until(condition: Callable[[], Any], limit: float = LIMIT) -> Any:
-    """Call a function until its result is true, and return this result."""
-    end = time.monotonic() + limit
-    while not (found := condition()):
-        assert time.monotonic() < end, f'the condition is not true within {limit} s'
-        time.sleep(0.002)
-    return found
 
 
 class Dialogue:
@@ -39,7 +27,7 @@ class Dialogue:
     read all replies.
     """
 
-    def __init__(self, script: list[tuple[str, str]], terminator: str = '\r') -> None:
+    def __init__(self, script, terminator='\r'):
         self._script = [(command + terminator, reply) for command, reply in script]
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
@@ -50,7 +38,7 @@ class Dialogue:
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
-    def _serve(self) -> None:
+    def _serve(self):
         received = ''
         while not self._closing:
             if not select.select([self._near], [], [], 0.01)[0]:
@@ -73,10 +61,10 @@ class Dialogue:
                     return
 
     @property
-    def over(self) -> bool:
+    def over(self):
         return self.sent == len(self._script) or bool(self.problems)
 
-    def close(self) -> None:
+    def close(self):
         self._closing = True
         self._thread.join()
         unread = struct.unpack('i', fcntl.ioctl(self._far, termios.FIONREAD, b'\0' * 4))[0]
@@ -89,11 +77,11 @@ class Dialogue:
 
 
 @pytest.fixture
-def dialogue() -> Iterator[Callable[..., Dialogue]]:
+def dialogue():
     """Return a function that makes a scripted device; its script must be complete at the end."""
     made: list[Dialogue] = []
 
-    def make(script: list[tuple[str, str]], terminator: str = '\r') -> Dialogue:
+    def make(script, terminator='\r'):
         made.append(Dialogue(script, terminator))
         return made[-1]
 
@@ -104,17 +92,17 @@ def dialogue() -> Iterator[Callable[..., Dialogue]]:
 
 
 @pytest.fixture
-def mute() -> Callable[..., Dialogue]:
+def mute():
     """Return a function that makes a scripted device, whose end the test itself checks."""
     return Dialogue
 
 
 @pytest.fixture
-def emulated() -> Iterator[Callable[..., Any]]:
+def emulated():
     """Return a function that makes an emulated device on a port: (device, emulator)."""
     made: list[Emulator] = []
 
-    def make(name: str, link: str | None = None, **options: Any) -> tuple[Any, Emulator]:
+    def make(name, link=None, **options):
         device = EMULATORS[name](**options)
         made.append(Emulator(device, link))
         return device, made[-1]
@@ -125,11 +113,11 @@ def emulated() -> Iterator[Callable[..., Any]]:
 
 
 @pytest.fixture
-def opened() -> Iterator[Callable[..., Regulator]]:
+def opened():
     """Return a function that opens a regulator, which is closed at the end of the test."""
     made: list[Regulator] = []
 
-    def make(backend: str, **options: Any) -> Regulator:
+    def make(backend, **options):
         regulator = create(backend, **(PATIENT | options))
         made.append(regulator)
         regulator.open()
@@ -142,5 +130,5 @@ def opened() -> Iterator[Callable[..., Regulator]]:
 
 
 @pytest.fixture
-def until() -> Callable[..., Any]:
-    return wait_until
+def until():
+    return wait_for

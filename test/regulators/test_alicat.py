@@ -171,22 +171,6 @@ def test_a_device_that_rejects_units_is_set_without_them(emulated, opened, until
     assert 'AS50.00' in line.commands
 
 
-@pytest.mark.parametrize(
-    ('name', 'value', 'allowed'),
-    [
-        ('unit_id', 'a', 'one letter from A to Z'),
-        ('baudrate', 0, '300 to 4000000'),
-        ('silence', float('nan'), '0.05 to 10 s'),
-        ('port', '', 'the name of a serial port'),
-    ],
-)
-def test_bad_options_name_value_and_range(name, value, allowed):
-    with pytest.raises(ConfigError) as caught:
-        create('alicat', **{'port': 'somewhere', name: value})
-    for part in ('alicat', name, str(value), allowed):
-        assert part in str(caught.value)
-
-
 # --- against the emulator ----------------------------------------------------------------------
 
 

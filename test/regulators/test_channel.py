@@ -8,15 +8,13 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from shared import Device
 
 from ros_pad.control.faults import KINDS, Kind, text
-from ros_pad.errors import InvalidInput, ProtocolError, TransportError
+from ros_pad.errors import TransportError
 from ros_pad.records import COMMAND, Block
-from ros_pad.regulators import Reading, create
+from ros_pad.regulators import create
 from ros_pad.regulators.channel import Health, Level, SupervisedChannel, SupervisorSettings
-from ros_pad.regulators.protocol import permitted
 from ros_pad.regulators.supervision import Supervision, supply_health
 
 MS = 1_000_000
@@ -38,44 +36,6 @@ class Log:
 
     def texts(self, level):
         return [text for each, text in self.lines if each == level]
-
-
-class Device:
-    """A device whose pressure is its set-point, on a cable that may break."""
-
-    def __init__(self, ceiling=CEILING):
-        self.ceiling = ceiling
-        self.setpoint = 40e3  # of an earlier user
-        self.received = []  # set-points, confirmed or not
-        self.is_open = False
-        self.broken = None
-        self.reads = None  # pressure that is read, if not the set-point
-        self.faults = ()
-
-    def open(self):
-        self.is_open = True
-
-    def set_pressure(self, gauge_pa):
-        self.setpoint = permitted(gauge_pa, self.ceiling)
-        self.received.append(gauge_pa)
-        self._answer()
-
-    def read(self):
-        self._answer()
-        pressure = self.setpoint if self.reads is None else self.reads
-        return Reading(pressure, self.setpoint, self.faults, 0.0)
-
-    def vent(self):
-        self._answer()
-        self.setpoint = 0.0
-
-    def close(self):
-        self.is_open = False
-
-    def _answer(self):
-        assert self.is_open
-        if self.broken:
-            raise self.broken
 
 
 class Rig:
@@ -485,116 +445,3 @@ def test_a_pad_that_is_held_says_so_in_records():
     (row,) = rig.record.rows[0]
     assert KINDS[row['detail'][0]] is Kind.CEILING
     assert math.isnan(row['pad'])  # not known of a real device
-
-
-# --- any sequence of calls -----------------------------------------------------------------------
-
-LEGS = (1, 2)
-numbers = st.one_of(
-    st.floats(),
-    st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 5e-324, 1.7976931348623157e308]),
-)
-legs = st.sampled_from(LEGS)
-errors = st.sampled_from([TransportError('cable'), ProtocolError('garbage')])
-ACTIONS = st.one_of(
-    st.tuples(st.just('send'), legs, st.floats(0.0, CEILING), st.just(0.0)),
-    st.tuples(st.just('send'), legs, st.floats(0.9 * CEILING, 1.2 * CEILING), st.just(0.0)),
-    st.tuples(st.just('send'), legs, numbers, numbers),
-    st.tuples(
-        st.just('tick'),
-        st.one_of(st.integers(0, 10**9), st.integers(-(10**9), 0), st.integers(-(2**62), 2**61)),
-    ),
-    st.tuples(st.just('read'), legs),
-    st.tuples(st.just('vent'), legs),
-    st.tuples(st.just('deactivate'), legs),
-    st.tuples(st.just('activate'), legs),
-    st.tuples(st.just('set'), st.just('command_timeout'), numbers),
-    st.tuples(st.just('set'), st.just('on_fault'), st.sampled_from(['report', 'vent', 'x'])),
-    st.tuples(st.just('cable'), legs, st.one_of(st.none(), errors)),
-    st.tuples(st.just('gauge'), legs, st.one_of(st.none(), numbers)),
-    st.tuples(st.just('gauge'), legs, st.floats(0.0, 1.1 * CEILING)),
-)  # fmt: skip
-
-
-class Trial:
-    """Two channels with any sequence of calls, and checks after each call."""
-
-    def __init__(self):
-        self.devices = {leg: Device() for leg in LEGS}
-        self.rig = Rig(*self.devices.values()).start()
-        self.channels = dict(zip(LEGS, self.rig.channels, strict=True))
-        self.accepted_ns = dict.fromkeys(LEGS, -math.inf)
-        self.now_ns = self.rig.now_ns
-        self.settings = SupervisorSettings()
-
-    def send(self, leg, gauge, age):
-        if self.channels[leg].command(gauge, age, self.now_ns):
-            self.accepted_ns[leg] = self.now_ns
-            assert abs(age) <= self.settings.command_timeout
-
-    def tick(self, step_ns):
-        self.now_ns += step_ns
-        timeout_ns = self.settings.command_timeout * 1e9
-        self.rig.supervision.tick(self.now_ns)
-        for leg, channel in self.channels.items():
-            old = abs(self.now_ns - self.accepted_ns[leg]) > timeout_ns
-            if not self.devices[leg].broken and (step_ns < 0 or old):
-                assert self.devices[leg].setpoint == 0.0
-                assert channel.vented
-
-    def read(self, leg):
-        channel, device = self.channels[leg], self.devices[leg]
-        pressure = channel.read(self.now_ns)
-        assert pressure is None or math.isfinite(pressure)
-        if pressure is not None and pressure > 1.02 * CEILING:
-            assert channel.held
-            assert device.setpoint == 0.0
-
-    def vent(self, leg):
-        self.channels[leg].vent('a test')
-        assert self.channels[leg].vented == (not self.devices[leg].broken)
-
-    def deactivate(self, leg):
-        self.channels[leg].deactivate('a test')
-
-    def activate(self, leg):
-        self.channels[leg].activate(self.now_ns)
-
-    def set(self, name, value):
-        try:
-            self.settings = dataclasses.replace(self.settings, **{name: value})
-        except InvalidInput:
-            return
-        for channel in self.channels.values():
-            channel.settings = self.settings
-
-    def cable(self, leg, error):
-        self.devices[leg].broken = error
-
-    def gauge(self, leg, value):
-        self.devices[leg].reads = value
-
-    def check(self):
-        for leg, device in self.devices.items():
-            assert all(math.isfinite(each) and 0.0 <= each <= CEILING for each in device.received)
-            if not self.channels[leg].active and not device.broken:
-                self.rig.supervision.tick(self.now_ns)
-                assert device.setpoint == 0.0
-
-
-@settings(max_examples=150, deadline=None)
-@given(st.lists(ACTIONS, max_size=25))
-def test_no_sequence_of_calls_passes_the_ceiling_or_stops_the_timeout(actions):
-    trial = Trial()
-    for name, *arguments in actions:
-        getattr(trial, name)(*arguments)
-        trial.check()
-    for leg in LEGS:
-        trial.cable(leg, None)
-        trial.gauge(leg, None)
-    trial.tick(round(trial.settings.command_timeout * 1e9) + 1)
-    assert all(device.setpoint == 0.0 for device in trial.devices.values())
-    for leg, channel in trial.channels.items():
-        channel.activate(trial.now_ns)
-        assert channel.command(30e3, 0.0, trial.now_ns)
-        assert trial.devices[leg].setpoint == 30e3

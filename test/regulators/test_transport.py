@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Regulators on one port share its thread, and no call waits for a reply."""
 
-import subprocess
 import sys
 import threading
 import time
 from types import SimpleNamespace
 
 import pytest
+from shared import python
 
 from ros_pad.errors import ConfigError, PadError, ProtocolError, TransportError
 from ros_pad.regulators import create, serial_device
@@ -209,6 +209,6 @@ def test_a_port_that_is_missing_or_in_use_is_an_error(emulated, opened):
     _, line = emulated('alicat')
     opened('alicat', port=line.path)
     code = f'from ros_pad.regulators import create; create("alicat", port="{line.path}").open()'
-    other = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True)
+    other = python('-c', code)
     assert 'TransportError' in other.stderr
     assert 'lock' in other.stderr

@@ -14,7 +14,7 @@ from ros_pad.contact import Film, Foot, MeasuredLimit, Pad, force_limit, tangent
 from ros_pad.reports.explore import FIELDS, STATES, explore, inputs_of, rows
 from ros_pad.reports.explore_drawings import drawings
 from ros_pad.reports.explore_page import foot_file
-from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel, Scene
+from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel
 from ros_pad.simulation.pneumatics import time_to
 
 LARGE = inputs_of(Foot.load('large37'))
@@ -61,13 +61,6 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness):
         assert found.grip[state] == pytest.approx(value, rel=1e-12)
     above = next(each for each in found.remarks if each.name == 'load')
     assert 'above the force limit' in above.text and not above.error
-
-
-def test_film_time_and_hose_are_those_of_the_scene():
-    scene = Scene.load('hexapod_patches')
-    assert scene.floor.film_thickness == LARGE['film']
-    assert scene.regulator == {'hose_diameter': LARGE['bore'], 'hose_length': LARGE['hose']}
-    assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE['stand']
 
 
 def test_a_measured_limit_stays_with_its_pad():
@@ -131,20 +124,6 @@ def test_a_foot_that_no_file_may_have_is_refused():
         error.text == 'ceiling = 849.0 is not allowed: a number from 1000 to 1000000 Pa is needed'
     )
     assert found.foot is None and found.free is not None
-
-
-def notes(**values):
-    found = changed(**values)
-    assert not any(each.error for each in found.remarks)
-    assert {key for key, text in texts(found).items() if text == '–'} == {'ring-height'}
-    return {each.name: each.text for each in found.remarks}
-
-
-def test_what_is_worth_knowing_is_no_error():
-    assert 'ends at 91.34 kPa' in notes(supply=150e3, criterion='flattening')['supply']
-    assert 'thickness is used' in notes(radius=1.4e-3)['criterion']
-    assert 'pads overlap' in notes(pads=120)['pads']
-    assert 'domes touch one another' in notes(pads=91)['pads']
 
 
 @pytest.mark.parametrize('field', FIELDS, ids=[field.name for field in FIELDS])

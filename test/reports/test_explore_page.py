@@ -10,7 +10,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 import urllib.error
 import urllib.parse
@@ -236,56 +235,22 @@ class Shown:
         self.said.append(text)
 
 
-def asked(monkeypatch, compute, scenario):
-    """Let a page without elements answer by a function; return what was shown of it."""
-    monkeypatch.setattr(explore_page, 'answer', compute)
-    element, shown = Shown(), []
-
-    async def play():
-        page = explore_page.Page({'load': 0})
-        page._status, page._answers = element, (element,)
-        page._show = lambda found: shown.append(found)
-        await asyncio.wait_for(scenario(page), 60.0)
-
-    # Beside the event loop of the browser's driver.
-    with ThreadPoolExecutor() as pool:
-        pool.submit(asyncio.run, play()).result()
-    return shown, element.said
-
-
-def test_changes_that_come_meanwhile_are_answered_together(monkeypatch):
-    computed, begun, go = [], threading.Event(), threading.Event()
-
-    def compute(inputs):
-        computed.append(inputs['load'])
-        begun.set()
-        go.wait()
-        return (inputs['load'],)
-
-    async def scenario(page):
-        first = asyncio.ensure_future(page.answer())
-        await asyncio.to_thread(begun.wait)
-        others = [asyncio.ensure_future(page.change('load', load)) for load in range(1, 10)]
-        await asyncio.sleep(0.0)
-        go.set()
-        await asyncio.gather(first, *others)
-
-    shown, said = asked(monkeypatch, compute, scenario)
-    assert computed == shown == [0, 9]
-    # Old numbers stay pale until the last answer.
-    assert said == [{'add': 'stale'}] * 10 + [{'remove': 'stale'}]
-
-
 def test_an_answer_that_fails_leaves_no_old_numbers_as_new(monkeypatch):
     def compute(inputs):
         raise ValueError('broken')
 
-    async def scenario(page):
+    monkeypatch.setattr(explore_page, 'answer', compute)
+    element = Shown()
+
+    async def play():
+        page = explore_page.Page({'load': 0})
+        page._status, page._answers = element, (element,)
         with pytest.raises(ValueError, match='broken'):
             await page.answer()
 
-    shown, said = asked(monkeypatch, compute, scenario)
-    assert shown == [] and said == [{'add': 'stale'}, 'no answer: broken']
+    with ThreadPoolExecutor() as pool:  # beside the event loop of the browser's driver
+        pool.submit(asyncio.run, play()).result()
+    assert element.said == [{'add': 'stale'}, 'no answer: broken']
 
 
 def test_without_the_extra_the_remedy_is_printed(monkeypatch, capsys):

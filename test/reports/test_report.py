@@ -346,17 +346,9 @@ def test_unobservable_ground_is_counted_by_stance():
     assert f'not pulled {100 * not_pulled / len(ends):.0f} %' in text
 
 
-def test_conditions_have_values_and_units(walk):
+def test_conditions_say_how_to_repeat_a_walk(walk):
     rows = dict(conditions.rows(walk))
-    assert f'numpy {np.__version__}' in rows['versions'] and 'python 3.' in rows['versions']
-    assert rows['scene'] == 'hexapod_patches' and rows['gait cycles'] == '3'
-    assert rows['robot'] == 'ch3r' and 'mass 2.09' in rows['body']
-    assert 'pad.stiffness 40.0' in rows['foot'] and 'ceiling 90000.0' in rows['foot']
-    assert 'wet_fraction 0.45' in rows['floor'] and 'viscosity 0.001' in rows['floor']
-    assert 'weight 9' in rows['tow']
-    for value in ('rate 250', 'force 0.03', 'position 0.00015'):
-        assert value in rows['sensors']
-    assert 'hose_diameter 0.004' in rows['regulator']
+    assert 'pad.stiffness 40.0' in rows['foot'] and 'wet_fraction 0.45' in rows['floor']
     assert rows['command to repeat it'] == (
         'pad run hexapod_patches --policy adaptive --seed 0 --fidelity L2 --cycles 3'
         ' --foot large37'

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of wetted meshes: exactly the wall below the contact line is coloured wet."""
 
-import pathlib
-
 import matplotlib.image
 import numpy as np
 import pytest
@@ -17,7 +15,7 @@ LIQUID = Liquid(0.02, 0.011)
 DOME = Mesh.dome(1.55e-3, 0.583e-3, rings=16, sectors=24)
 
 
-def area(triangles: np.ndarray) -> float:
+def area(triangles):
     a, b, c = np.moveaxis(triangles, 1, 0)
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
 
@@ -57,7 +55,7 @@ def test_nothing_is_wet_where_there_is_no_answer():
 
 
 @pytest.mark.parametrize('height', [0.5e-3, 5e-3, 50e-3])
-def test_pads_of_any_height_are_drawn_whole(height: float, tmp_path: pathlib.Path):
+def test_pads_of_any_height_are_drawn_whole(height, tmp_path):
     mesh = Mesh.cylinder(1.2e-3, height)
     found = wet(mesh, LIQUID, 'force', slices=12)
     write_picture(tmp_path / 'it.png', lambda: wetted.draw(mesh, found))
@@ -67,7 +65,7 @@ def test_pads_of_any_height_are_drawn_whole(height: float, tmp_path: pathlib.Pat
 
 
 @pytest.mark.parametrize('kind', ['one', 'saturated', 'many'])
-def test_figures_are_written(kind: str, tmp_path: pathlib.Path):
+def test_figures_are_written(kind, tmp_path):
     mesh, found = DOME, wet(DOME, LIQUID if kind == 'one' else Liquid(0.073, 0.073), slices=12)
     if kind == 'many':
         mesh = Mesh.dome_pattern(7, 4e-3, 1.5e-3, 0.5e-3, 2.8e-3, rings=6, sectors=12)

@@ -23,7 +23,7 @@ Q = np.array([[0.3, -0.7, 0.12], [-1.1, 0.4, 0.9], [0.5, 0.2, -1.3]])
 GRAVITY = np.array([1.5, -0.8, -9.6])
 
 
-def odd() -> Robot:
+def odd():
     return Robot.load(URDF, feet=FEET, imu='imu', foot_radius=0.02)
 
 

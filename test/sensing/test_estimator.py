@@ -274,21 +274,6 @@ def test_bad_readings_are_refused_and_change_nothing(index, value, message):
         motion.estimator.update(motion.time, *readings[1:5])
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'message'),
-    [
-        ({'gyro_noise': 0.0}, 'gyro_noise'),
-        ({'encoder_noise': math.nan}, 'encoder_noise'),
-        ({'rate': 1.0}, 'rate'),
-        ({'window': 2.0}, 'window'),
-        ({'force_axes': 'world'}, 'force_axes'),
-    ],
-)
-def test_arguments_that_are_not_allowed(arguments, message):
-    with pytest.raises(InvalidInput, match=message):
-        BodyEstimator(POINTED, **arguments)
-
-
 def test_wild_readings_never_give_nan():
     generator = np.random.default_rng(3)
     estimator = BodyEstimator(POINTED)

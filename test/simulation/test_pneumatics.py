@@ -275,18 +275,6 @@ def test_time_to_fill_against_a_divided_hose(size, volume):
 # --- bad input ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('name, value', [('natural_frequency', 0.0), ('quantum', 'fine')])
-def test_regulator_refuses(name, value):
-    with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed'):
-        RegulatorModel(**{name: value})
-
-
-@pytest.mark.parametrize('diameter, length', [(4.0, 1.0), (0.004, math.nan)])
-def test_hose_refuses(diameter, length):
-    with pytest.raises(InvalidInput, match=r'hose_(diameter|length) = .* m is needed'):
-        Hose(diameter, length)
-
-
 @pytest.mark.parametrize('volume', [0.0, math.nan, lambda p: 1e-3 - p * 1e-8])
 def test_pad_volume_refused(volume):
     with pytest.raises(InvalidInput, match='pad_volume'):

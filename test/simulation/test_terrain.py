@@ -74,12 +74,6 @@ def test_wet_along_is_wet():
     assert floor.wet_along(x.reshape(2, -1), y.reshape(2, -1)).shape == (2, len(x) // 2)
 
 
-@pytest.mark.parametrize('fraction', [0.0, 1.0, math.nan])
-def test_bad_wet_fraction(fraction):
-    with pytest.raises(InvalidInput, match='wet_fraction'):
-        Floor.patches(fraction, 1.0, FILM, 0)
-
-
 # --- drawn floors -----------------------------------------------------------------------------
 
 DRAWING = ('..#', '###')  # the first row is on the left (+y)

@@ -70,18 +70,3 @@ def test_processes_keep_the_order_and_pass_errors_on():
     assert command.in_processes(divmod, cases, 2, 'test') == [divmod(*each) for each in cases]
     with pytest.raises(ZeroDivisionError):
         command.in_processes(divmod, [(7, 2), (9, 0)], 1, 'test')
-
-
-def test_counts_have_a_least_value(capsys):
-    parser = command.parser('some', 'Some study.')
-    command.add_count(parser, '--floors', 12, 'seeds', least=2)
-    assert parser.parse_args(['--floors', '2']).floors == 2
-    for word in ('1', '-3', 'two'):
-        with pytest.raises(SystemExit):
-            parser.parse_args(['--floors', word])
-        assert 'a whole number from 2' in capsys.readouterr().err
-
-
-def test_errors_of_a_study_end_with_a_status(capsys):
-    assert main(['thesis', '--only', '19']) == 2
-    assert 'figures = [19]' in capsys.readouterr().err

@@ -3,7 +3,6 @@ import csv
 import dataclasses
 import math
 import os
-import pathlib
 import signal
 import sqlite3
 import sys
@@ -93,7 +92,7 @@ def test_values_land_where_they_belong():
         ({'parameters': {'policy.wet_above': [0.5]}}, 'only adaptive has parameters'),
     ],
 )  # fmt: skip
-def test_what_is_not_allowed_is_refused_by_name(changes, message, tmp_path: pathlib.Path):
+def test_what_is_not_allowed_is_refused_by_name(changes, message, tmp_path):
     with pytest.raises((ConfigError, InvalidInput), match=message):
         sweeps.run(dataclasses.replace(Sweep([LEG], seeds=[0]), **changes), tmp_path / 'new')
     assert not (tmp_path / 'new').exists()
@@ -103,7 +102,7 @@ def test_what_is_not_allowed_is_refused_by_name(changes, message, tmp_path: path
 
 
 @pytest.mark.slow
-def test_rows_are_those_of_single_trials_whatever_the_number_of_workers(tmp_path: pathlib.Path):
+def test_rows_are_those_of_single_trials_whatever_the_number_of_workers(tmp_path):
     reported = []
     one = sweeps.run(SMALL, tmp_path / 'one', 1, progress=reported.append)
     two = sweeps.run(SMALL, tmp_path / 'two', 2)
@@ -122,7 +121,7 @@ def test_rows_are_those_of_single_trials_whatever_the_number_of_workers(tmp_path
     assert [float(each['distance_m']) for each in read] == [row['distance_m'] for row in two]
 
 
-def test_a_trial_that_fails_is_a_row_and_can_be_tried_again(tmp_path: pathlib.Path, monkeypatch):
+def test_a_trial_that_fails_is_a_row_and_can_be_tried_again(tmp_path, monkeypatch):
     sweep = Sweep([LEG], ['flat'], [0, 1, 2], SHORT)
     jobs = sweep.jobs()
     broken = dataclasses.replace(jobs[1], policy_parameters=1)
@@ -146,7 +145,7 @@ class Deadly:
 
 
 @pytest.mark.slow
-def test_a_process_that_dies_costs_only_its_own_trial(tmp_path: pathlib.Path, monkeypatch):
+def test_a_process_that_dies_costs_only_its_own_trial(tmp_path, monkeypatch):
     sweep = Sweep([LEG], ['flat'], range(5), SHORT)
     jobs = sweep.jobs()
     jobs[2] = dataclasses.replace(jobs[2], tuning=Deadly())
@@ -160,7 +159,7 @@ def test_a_process_that_dies_costs_only_its_own_trial(tmp_path: pathlib.Path, mo
 
 
 @pytest.mark.slow
-def test_a_sweep_that_was_stopped_keeps_what_is_done_and_goes_on(tmp_path: pathlib.Path):
+def test_a_sweep_that_was_stopped_keeps_what_is_done_and_goes_on(tmp_path):
     def stop(done):
         if done == 3:
             raise KeyboardInterrupt
@@ -175,7 +174,7 @@ def test_a_sweep_that_was_stopped_keeps_what_is_done_and_goes_on(tmp_path: pathl
     assert without_pace(rows) == without_pace(sweeps.run(SMALL, tmp_path / 'whole', 1))
 
 
-def test_more_of_the_same_is_added_and_less_refused(tmp_path: pathlib.Path):
+def test_more_of_the_same_is_added_and_less_refused(tmp_path):
     small = Sweep([LEG], ['flat'], [0], SHORT)
     more = dataclasses.replace(small, seeds=[1, 0])
     first = sweeps.run(small, tmp_path / 'sweep', 1)
@@ -186,7 +185,7 @@ def test_more_of_the_same_is_added_and_less_refused(tmp_path: pathlib.Path):
         sweeps.run(small, tmp_path / 'sweep', 1)
 
 
-def test_another_sweep_in_the_same_folder_is_refused(tmp_path: pathlib.Path, monkeypatch):
+def test_another_sweep_in_the_same_folder_is_refused(tmp_path, monkeypatch):
     mine = tmp_path / 'mine.yaml'
     text = (configuration.shared_folder() / 'scenes' / f'{LEG}.yaml').read_text()
     mine.write_text(text)
@@ -207,7 +206,7 @@ def test_another_sweep_in_the_same_folder_is_refused(tmp_path: pathlib.Path, mon
         sweeps.run(sweep, tmp_path / 'sweep', 1)
 
 
-def test_a_folder_has_one_sweep_at_work_at_a_time(tmp_path: pathlib.Path):
+def test_a_folder_has_one_sweep_at_work_at_a_time(tmp_path):
     with (
         Results(tmp_path / 'sweep', {}, []),
         pytest.raises(PadError, match='a sweep is running'),
@@ -216,7 +215,7 @@ def test_a_folder_has_one_sweep_at_work_at_a_time(tmp_path: pathlib.Path):
     Results(tmp_path / 'sweep', {}, []).__exit__()
 
 
-def test_a_kill_in_the_middle_of_a_write_leaves_the_rows_before_it(tmp_path: pathlib.Path):
+def test_a_kill_in_the_middle_of_a_write_leaves_the_rows_before_it(tmp_path):
     """The process is killed after many rows are in the file, but before their commit."""
     child = os.fork()
     if not child:
@@ -266,7 +265,7 @@ def test_points_are_means_with_students_interval():
 # --- Dask ---------------------------------------------------------------------------------------
 
 
-def test_without_dask_the_extra_is_named(tmp_path: pathlib.Path, monkeypatch):
+def test_without_dask_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'distributed', None)
     with pytest.raises(PadError, match=r'pip install "ros_pad\[sweep\]"'):
         sweeps.run(SMALL, tmp_path / 'sweep', scheduler='tcp://127.0.0.1:1')
@@ -274,7 +273,7 @@ def test_without_dask_the_extra_is_named(tmp_path: pathlib.Path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_cluster_that_loses_a_worker_loses_no_trial(tmp_path: pathlib.Path):
+def test_a_cluster_that_loses_a_worker_loses_no_trial(tmp_path):
     distributed = pytest.importorskip('distributed', reason='pip install "ros_pad[sweep]"')
     sweep = Sweep([LEG], ['flat', 'dome'], range(8), {'cycles': [10]})
     killed = []

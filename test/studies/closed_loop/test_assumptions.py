@@ -10,8 +10,7 @@ import inspect
 import json
 import pathlib
 import re
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 import yaml
@@ -51,11 +50,11 @@ class Row(NamedTuple):
     doubled: str | None
 
     @property
-    def number(self) -> float:
+    def number(self):
         return float(re.match(r'[-+0-9.e]+|inf', self.value)[0])
 
 
-def rows() -> list[Row]:
+def rows():
     """Return the rows of every table with a column ``where``."""
     found = []
     header: list[str] = []
@@ -81,7 +80,7 @@ def rows() -> list[Row]:
 ROWS = rows()
 
 
-def numbers(table: dict[str, Any], path: str = '') -> Iterator[tuple[str, float]]:
+def numbers(table, path=''):
     """Yield the dotted key and the value of every number in a YAML file, but for geometry."""
     for key, value in table.items():
         if key in ('legs', 'imu') or isinstance(value, (bool, list)):
@@ -95,7 +94,7 @@ def numbers(table: dict[str, Any], path: str = '') -> Iterator[tuple[str, float]
                 assert isinstance(value, str)
 
 
-def defaults(module: str, name: str) -> dict[str, float]:
+def defaults(module, name):
     """Return the numeric defaults of a class or function of ros_pad."""
     part = importlib.import_module('ros_pad.' + module.removesuffix('.py').replace('/', '.'))
     parameters = inspect.signature(getattr(part, name)).parameters.values()
@@ -107,7 +106,7 @@ def defaults(module: str, name: str) -> dict[str, float]:
 
 
 @pytest.fixture(scope='module')
-def document() -> dict[str, Any]:
+def document():
     return json.loads(DOCUMENT.read_text(encoding='utf-8'))
 
 
@@ -117,13 +116,13 @@ def test_the_page_has_rows_and_known_statuses():
         assert row.status.split()[0].strip(',:;') in STATUSES, row
 
 
-def comment(text: str, key: str) -> bool:
+def comment(text, key):
     """Whether the line of a key, or that of the table that it is in, has a comment."""
     return any(re.search(rf'^ *{name}:.*#', text, re.MULTILINE) for name in key.split('.')[-2:])
 
 
 @pytest.mark.parametrize('path', FILES, ids=lambda path: f'{path.parent.name}/{path.stem}')
-def test_every_number_of_a_file_is_on_the_page_or_has_its_source_there(path: pathlib.Path):
+def test_every_number_of_a_file_is_on_the_page_or_has_its_source_there(path):
     name, text = f'{path.parent.name}/{path.name}', path.read_text(encoding='utf-8')
     table = yaml.safe_load(text)
     found = dict(numbers(table))
@@ -146,7 +145,7 @@ def test_no_row_is_about_a_key_that_is_gone():
 @pytest.mark.parametrize(
     ('module', 'name'), [(module, name) for module, names in TUNED.items() for name in names]
 )
-def test_every_default_is_on_the_page(module: str, name: str):
+def test_every_default_is_on_the_page(module, name):
     found = defaults(module, name)
     assert found
     quoted = {r.key.removeprefix(f'{name}.'): r.number for r in ROWS if r.pattern == module}

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study of force limits."""
 
-from __future__ import annotations
-
 import json
 import pathlib
 from dataclasses import replace
@@ -34,7 +32,7 @@ def test_powers_by_hand():
     assert radius == pytest.approx(1.0 + pressure, abs=0.05)
 
 
-def test_command(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+def test_command(tmp_path, capsys):
     assert main(['force_limits', '--out', str(tmp_path)]) == 0
     assert 'membrane' in capsys.readouterr().out
     assert {each.name for each in tmp_path.iterdir()} == {'force_limits.json', 'force_limits.png'}

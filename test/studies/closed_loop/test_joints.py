@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study joints, on made-up walks and on a short one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -188,20 +188,3 @@ def test_readings_are_those_of_the_file(tmp_path):
     np.testing.assert_allclose(found.foot_forces[:, :, 2], 0.5 * MASS * GRAVITY)
     feet = found.robot.foot_positions(found.joint_positions[0])
     np.testing.assert_allclose(feet, ICUB_HIPS - (0.0, 0.0, HEIGHT), atol=1e-12)
-
-
-def test_what_is_wrong_with_the_files_is_named(tmp_path, capsys):
-    def message(*words):
-        assert main(['foreign', *map(str, words)]) == 2
-        return capsys.readouterr().err
-
-    assert 'https://github.com/mrsp/serow' in message()
-    assert 'go1.csv is not there; fetch it from https' in message('--go1', tmp_path)
-    assert 'walking.mat is not there; fetch it from https' in message('--icub', tmp_path)
-    write_go1(tmp_path)
-    (tmp_path / 'go1_odom.csv').write_text('a,b\n1,2\n3,4\n')
-    assert 'go1_odom.csv' in message('--go1', tmp_path)
-    write_icub(tmp_path, imuAcc=np.zeros((7, 3)))
-    assert 'imuAcc has shape (7, 3)' in message('--icub', tmp_path)
-    write_icub(tmp_path, lfForceZ=np.full(round(LAST * 100), np.nan))
-    assert 'lfForceZ has values that are not finite' in message('--icub', tmp_path)

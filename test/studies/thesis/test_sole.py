@@ -13,7 +13,7 @@ from studies.thesis.sole import CELLS, FLAT, TENSION, rise
 READINGS = ('corrected', 'thesis')
 
 
-def rise_by_polynomial(radius_mm: float, reading: str) -> list[float]:
+def rise_by_polynomial(radius_mm, reading):
     """Return all heights, mm, that satisfy equation 3.101: roots of its square at 30 digits."""
     with mpmath.workdps(30):
         r = mpmath.mpf(radius_mm)

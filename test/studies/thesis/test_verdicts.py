@@ -16,7 +16,6 @@ from studies.thesis.explained import (
     TUNED,
     VERDICTS,
     Claim,
-    counted,
 )
 
 CLAIMS = statements.claims()
@@ -37,14 +36,6 @@ CLAIM = Claim(figure=20, thesis='more', ours='less', numbers=(1.0,), holds=True,
 )
 def test_verdict(changes, verdict):
     assert dataclasses.replace(CLAIM, **changes).verdict == verdict
-
-
-def test_verdicts_are_counted_and_explained():
-    tuned = dataclasses.replace(CLAIM, tuned='friction', missing='loads', rule='Above 1.')
-    assert counted([CLAIM, tuned, CLAIM]) == '2 reproduced, 1 tuned to agree'
-    assert tuned.reason() == 'Above 1. Tuned: friction.'
-    assert dataclasses.replace(tuned, holds=None).reason() == 'Above 1. Missing: loads.'
-    assert dataclasses.replace(tuned, holds=False).reason() == 'Above 1.'
 
 
 def test_the_page_shows_what_the_study_wrote(kept):

@@ -177,23 +177,6 @@ def test_methods_get_the_same_speed_as_the_estimator():
 # --- changes ------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def plain():
-    return walks.pull(SCENE, 4.0, 3)
-
-
-def generator():
-    return np.random.default_rng(0)
-
-
-def test_messages(plain):
-    slow = conditions.rate(plain, 50.0, generator())
-    assert np.flatnonzero(slow.arrived[:, 0])[:3].tolist() == [0, 5, 10]
-    late = conditions.late_position(plain, 0.02, generator()).position
-    assert (late[5:] == plain.position[:-5]).all()
-    assert slow.arrived.sum() == 6 * 200
-
-
 # --- the study ----------------------------------------------------------------------------------
 
 

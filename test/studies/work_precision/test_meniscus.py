@@ -83,19 +83,3 @@ def test_exact_methods_are_exact_and_never_fail(results):
         assert result.error < 1e-10
     for problem in {result.problem for result in exact}:
         assert results[problem, meniscus.SHOOTING].error < 1e-6
-
-
-def test_approximations_are_off_and_reported(results):
-    light = 'bridge, force on the sphere'
-    assert 0.001 < results[light, 'circle'].median_error < 0.05
-    assert results[light, 'circle'].wrong > 0  # more than 10 % wrong for wide bridges
-    assert results[light, '4 π γ R cos θ, batch'].wrong >= results[light, 'circle'].wrong
-    without = results[light + ', with gravity', 'exact, without gravity']
-    assert 1e-8 < without.median_error < 1e-2
-    # On a dome smaller than the capillary length a wedge with a straight edge is a bad model.
-    ring = 'ring round a pressed dome, height'
-    for method in ('thesis, 3.80', 'corrected'):
-        assert results[ring, method].median_error > 0.3
-        batch = results[ring, f'{method}, batch']
-        assert batch.error == pytest.approx(results[ring, method].error, rel=1e-12)
-    assert results[ring, meniscus.BATH].error < 1e-6

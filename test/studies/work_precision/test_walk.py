@@ -3,14 +3,11 @@ import importlib.util
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import RailLeg, Scene
-from ros_pad.simulation.full_robot import FullRobot
 from studies.work_precision.walk import chart, hexapod, rail, results, study
-from studies.work_precision.walk.drake import DrakeRobot
 from studies.work_precision.walk.walkers import HEXAPOD, RAIL, Walk, Walked, Walker
 
 pytestmark = pytest.mark.slow
@@ -110,49 +107,6 @@ def test_two_references_leave_a_band():
     assert third.errors == pytest.approx(
         {'distance': 0.0, 'slip': 1.0, 'lateral': 0.0, 'yaw': 0.0}
     )
-
-
-# --- Drake --------------------------------------------------------------------------------------
-
-
-def towed():
-    """Return the walk with 9 N in tow on dry ground."""
-    return hexapod.hexapod_walks()[-1]
-
-
-@pytest.fixture
-def drakes():
-    pytest.importorskip('pydrake')
-    scene = replace(towed().scene, settle=1.0)
-    floor = scene.floor.build(0)
-    return lambda: DrakeRobot(scene, floor, 4e-3, 5e-4)
-
-
-def test_drake_has_the_masses_of_mujoco(drakes):
-    mujoco = pytest.importorskip('mujoco')
-    ours = drakes()
-    case = towed()
-    theirs = FullRobot(case.scene, case.scene.floor.build(0), 4e-3)
-    mujoco.mj_forward(theirs.model, theirs.data)
-    wanted = np.zeros((theirs.model.nv, theirs.model.nv))
-    mujoco.mj_fullM(theirs.model, theirs.data, wanted)
-    found = ours._plant.CalcMassMatrix(ours._context)
-    # Drake has angles before places.
-    trunk = ours._trunk.floating_velocities_start_in_v()
-    sled = [ours._plant.GetJointByName(f'sled_{axis}').velocity_start() for axis in range(3)]
-    order = [trunk + place for place in (3, 4, 5, 0, 1, 2)] + [*ours._speeds, *sled]
-    # L2 places the trunk as if the rods were infinitely thin.
-    assert np.abs(found[np.ix_(order, order)] - wanted).max() < 1e-5
-
-
-def test_drake_stands_on_the_weight(drakes):
-    robot = drakes()
-    for _ in range(90):
-        robot.step([0.0] * 6)
-    assert robot.verdict is None
-    assert robot._loads[:6].sum() == pytest.approx(2.09 * 9.80665, rel=2e-3)
-    assert robot._loads[6] == pytest.approx(9.0, rel=2e-3)
-    assert math.hypot(*robot.body[:2]) < 1e-3
 
 
 # --- the study ----------------------------------------------------------------------------------
