@@ -80,18 +80,12 @@ class BodyEstimator:
         Share of the expected load above which a foot stands, 0 to 0.9; 0 means 0.1, and 0.25
         where the force comes from joint torques. The expected load is the weight over half of the
         legs.
-    window : float
-        Length of the window of slip velocities, s, 0 to 1.
-    rate : float
-        Most samples a second that are expected, Hz, 10 to 10000: with more, the window is shorter.
     force_axes : str
         ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
         of the feet.
-    radius_error : float
-        Standard deviation of the radius with which feet roll, as a share of the robot's
-        ``foot_radius``, 0 to 1: soft feet sink in.
-    length_error : float
-        Standard deviation of the relative error of the length of all legs, 0 to 0.5.
+    sizes : bool
+        Whether the radius with which feet roll (soft feet sink in), and the relative error of the
+        length of all legs are estimated; otherwise they are those of the robot.
     rejection : bool
         Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
 
@@ -129,19 +123,14 @@ class BodyEstimator:
         force_noise: float = 0.3,
         accelerometer_bias: float = 0.05,
         contact_share: float = 0.0,
-        window: float = 0.02,
-        rate: float = 1000.0,
         force_axes: str = 'base',
-        radius_error: float = 0.05,
-        length_error: float = 0.003,
+        sizes: bool = True,
         rejection: bool = True,
     ) -> None:
         instance('robot', robot, Robot)
         if not robot.mass > 0.0:
             raise InvalidInput(f'robot {robot.name!r} is not allowed: its links have no mass')
         self._robot = robot
-        number('radius_error', radius_error, '(share)', 0.0, 1.0)
-        number('length_error', length_error, '(share)', 0.0, 0.5)
         self._given = motion.Given(
             gyro_noise=gyro_noise,
             accelerometer_noise=accelerometer_noise,
@@ -150,11 +139,9 @@ class BodyEstimator:
             force_noise=force_noise,
             accelerometer_bias=accelerometer_bias,
             contact_share=contact_share,
-            window=window,
-            rate=rate,
             force_axes=force_axes,
-            radius_error=radius_error * robot.foot_radius,
-            length_error=length_error,
+            radius_error=0.05 * robot.foot_radius if sizes else 0.0,
+            length_error=0.003 if sizes else 0.0,
             rejection=rejection,
         )
         for setting in SETTINGS:
@@ -173,10 +160,7 @@ class BodyEstimator:
         robot, given, legs = self._robot, self._given, len(self._robot.legs)
         gate = GATE if given.rejection else math.inf
         self._filter = BodyFilter(legs, given.gyro_noise, given.accelerometer_noise, gate)
-        samples = max(1, round(given.window * given.rate))
-        self._window = SlipWindow(
-            legs, given.window, samples, given.encoder_noise, given.velocity_noise
-        )
+        self._window = SlipWindow(legs, given.encoder_noise, given.velocity_noise)
         self._time = math.nan
         self._step = 0.0  # the last one, s
         self._feet = motion.Feet(legs)

@@ -31,7 +31,7 @@ class FootMotion(NamedTuple):
     in_contact : bool
         Whether the foot carries load.
     slip_velocity : array (2,)
-        Velocity of the contact point, x and y, m/s: mean of the last samples, see ``window``.
+        Velocity of the contact point, x and y, m/s: mean of the last 20 ms.
     slip_velocity_sd : float
         Standard deviation of each of its components, m/s. It includes that of the body's
         velocity, which is common to all feet and lasts for about a stance.
@@ -80,7 +80,7 @@ class BodyEstimate(NamedTuple):
 
 
 class Given(NamedTuple):
-    """Arguments of a body estimator; ``radius_error`` in m."""
+    """What a body estimator knows of its sensors; ``radius_error`` in m."""
 
     gyro_noise: float
     accelerometer_noise: float
@@ -89,8 +89,6 @@ class Given(NamedTuple):
     force_noise: float
     accelerometer_bias: float
     contact_share: float
-    window: float
-    rate: float
     force_axes: str
     radius_error: float
     length_error: float

@@ -279,8 +279,6 @@ def test_bad_readings_are_refused_and_change_nothing(index, value, message):
     [
         ({'gyro_noise': 0.0}, 'gyro_noise'),
         ({'encoder_noise': math.nan}, 'encoder_noise'),
-        ({'rate': 1.0}, 'rate'),
-        ({'window': 2.0}, 'window'),
         ({'force_axes': 'world'}, 'force_axes'),
     ],
 )
@@ -326,7 +324,7 @@ def test_joints_whose_velocity_is_not_theirs_are_named():
 
 @pytest.mark.parametrize(('rate', 'kind'), [(50.0, ''), (25.0, 'rate')])
 def test_a_rate_at_which_no_foothold_is_kept_is_named(rate, kind):
-    estimator = BodyEstimator(POINTED, rate=rate)
+    estimator = BodyEstimator(POINTED)
     still = np.zeros(POINTED.home.size)
     for step in range(50):
         found = estimator.update(
