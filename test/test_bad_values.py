@@ -44,7 +44,6 @@ CASES = (
     (capillary.wet_surface, (capillary.Wall.dome(2e-3, 1e-3), 'water'), 'liquid'),
     (capillary.Wall.through, ([1e-3, 2e-3], [0.0, 'top']), 'heights'),
     (robots.Gait.named, ('tripod', [0.1, 0.2], 1.0, 0.6, 0.03), 'hips'),
-    (ROBOT.gravity_torques, (ROBOT.home, -9.81), 'gravity'),
     (ROBOT.joint_positions, ([0.1, 0.0, -0.3],), 'feet'),
     (sensing.BodyEstimator, ('go2',), 'robot'),
     (sensing.Mapping.load, ('go2', 'go2'), 'robot'),

@@ -429,7 +429,7 @@ def _named(row: Table, known: Sequence[str]) -> tuple[_Read, list[str], Array, A
 def _feet(row: Table, robot: Robot) -> tuple[Array, tuple[str, ...]]:
     """Read the legs of places of feet; return what zeroes them, and the order of the joints."""
     zero = np.zeros(robot.home.size)
-    lines = robot.foot_jacobians(zero)
+    lines = robot.kinematics(zero).jacobians
     if lines.shape != (len(robot.legs), 3, 3) or np.abs(lines - np.eye(3)).max() > 1e-9:
         raise ConfigError(
             f'{row.origin}: places of feet need a robot whose legs slide along x, y and z,'
