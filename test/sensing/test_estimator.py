@@ -289,6 +289,14 @@ def test_arguments_that_are_not_allowed(arguments, message):
         BodyEstimator(POINTED, **arguments)
 
 
+def test_without_sizes_radius_and_legs_stay_those_of_the_file():
+    motion = Motion(dataclasses.replace(POINTED, foot_radius=0.02), noise=1.0, sizes=False)
+    for tick in range(150):
+        motion.step(speed_at(tick * DT))
+    assert motion.estimator.foot_radius == (0.02, 0.0)
+    assert motion.estimator.length_error == (0.0, 0.0)
+
+
 def test_wild_readings_never_give_nan():
     generator = np.random.default_rng(3)
     estimator = BodyEstimator(POINTED)
