@@ -104,6 +104,8 @@ def test_joint_positions_bring_the_feet_to_their_places(name):
     assert robot.foot_positions(q) == pytest.approx(goal, abs=1e-8)
     with pytest.raises(InvalidInput, match='does not reach'):
         robot.joint_positions(goal - 1.0)
+    with pytest.raises(InvalidInput, match='feet of shape'):
+        robot.joint_positions(goal[:, :1])
 
 
 def test_gaits_by_phase():
