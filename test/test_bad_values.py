@@ -33,7 +33,6 @@ def sample(**bad):
 CASES = (
     (capillary.Wall.through, ([1e-3, 2e-3], [0.0, 'top']), 'heights'),
     (robots.Gait.named, ('tripod', [0.1, 0.2], 1.0, 0.6, 0.03), 'hips'),
-    (ROBOT.gravity_torques, (ROBOT.home, -9.81), 'gravity'),
     (ROBOT.joint_positions, ([0.1, 0.0, -0.3],), 'feet'),
     (sensing.BodyEstimator, ('go2',), 'robot'),
     (sensing.BodyEstimator, (ROBOT,), {'gyro_noise': 0.0}),

@@ -21,24 +21,6 @@ LARGEST_PRESSURE = 1e7
 """Largest size of a gauge pressure, Pa."""
 
 
-class ContactMotion(NamedTuple):
-    """Motion of the contact point of a foot, as a body estimator has it from joints and IMU.
-
-    Attributes
-    ----------
-    velocity : tuple of float
-        Velocity over the floor, x and y, m/s.
-    sd : float
-        Standard deviation of each component, m/s, from 0.
-    doubt : str
-        Why the velocity must not be used; empty if it may be.
-    """
-
-    velocity: tuple[float, float]
-    sd: float
-    doubt: str = ''
-
-
 class Estimate(NamedTuple):
     """Estimate of one foot after a sample.
 
@@ -178,7 +160,8 @@ class FootEstimator:
         pressure: float,
         moment: float | None = None,
         position_time: float | None = None,
-        motion: ContactMotion | None = None,
+        velocity: Sequence[float] = (0.0, 0.0),
+        variance: float = math.inf,
     ) -> Estimate:
         """Process one sample.
 
@@ -199,8 +182,11 @@ class FootEstimator:
             the setting ``moment_noise`` 0.
         position_time : float or None
             Time at which the position was measured, s; None if it is `time`.
-        motion : ContactMotion or None
-            Motion of the contact point; needed with the setting ``source: joints``, else not used.
+        velocity : sequence of 2 floats
+            Velocity of the contact point over the floor, x and y, m/s, as a body estimator has it;
+            needed with the setting ``source: joints``, else not used.
+        variance : float
+            Variance of each of its components, m²/s²; infinite if it must not be used.
 
         Returns
         -------
@@ -211,25 +197,18 @@ class FootEstimator:
         ------
         InvalidInput
             When a value is not a finite number, force or position are not three numbers, time
-            does not advance, or the motion is missing or has a deviation below 0.
+            does not advance, or the variance is below 0.
         """
         tuning, track = self._track.ground.tuning, self._track
         if tuning.source != 'joints':
-            motion = ContactMotion((0.0, 0.0), 0.0)
-        elif motion is None:
-            raise InvalidInput(
-                f'sample at {time!r} s: motion = None is not allowed: with source joints the'
-                ' velocity of the contact is needed'
-            )
-        sd = number('deviation of the velocity', motion.sd, 'm/s', high=1e6)
+            velocity, variance = (0.0, 0.0), 0.0
         number('pressure', pressure, 'Pa', -LARGEST_PRESSURE, LARGEST_PRESSURE)
         yaw = math.nan if moment is None or not tuning.moment_noise else moment
         try:
             (fx, fy, fz), (x, y, z) = force, position
             age = 0.0 if position_time is None else abs(time - position_time)
-            variance = math.inf if motion.doubt else sd**2
-            sample = Sample(fx, fy, fz, yaw, x, y, z, *motion.velocity, variance, age)
-            sample = Sample(*map(float, sample))
+            numbers = fx, fy, fz, yaw, x, y, z, *velocity, variance, age
+            sample = Sample(*map(float, numbers))
         except (TypeError, ValueError) as error:
             raise InvalidInput(
                 f'sample at {time!r} s: force = {force!r}, position = {position!r}, moment ='

@@ -263,16 +263,14 @@ class Track:
 
     def __init__(self, ground: Ground) -> None:
         load, tuning = ground.expected_load, ground.tuning
-        self._joints = tuning.source == 'joints'
+        joints = tuning.source == 'joints'
         # An estimated position never stops, and its noise is not that of a marker.
-        marker = 0.0 if self._joints else tuning.position_noise
+        marker = 0.0 if joints else tuning.position_noise
         self._faults = SensorFaults(tuning.force_noise, marker, tuning.force_range or math.inf)
         self.ground, self.slip = ground, Slip(ground.foot, tuning)
-        memory = BODY_CORRELATION if self._joints else BLOCK
-        axes = Axes(load, self.slip.softness, memory)
-        self.watch = Watch(marker, tuning.force_noise, load, axes)
+        axes = Axes(load, self.slip.softness, BODY_CORRELATION if joints else BLOCK)
+        self.watch = Watch(marker, tuning.force_noise, load, axes, joints)
         self._offset, self._heights = Offset(load), Heights()
-        self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m
         self._window, self.time, self.stands = Window(0.0), -math.inf, False
         self.sound, self.fresh = True, True
         self.last: Standing | None = Standing()
@@ -347,21 +345,8 @@ class Track:
 
     def _look(self, time: float, dt: float, sample: Sample, force: Vector) -> None:
         """Watch over the sensors; the force is without offset, N."""
-        watch, offset, x, y = self.watch, self._offset, sample.x, sample.y
-        speed_sd = None
-        if self._joints:
-            moved, speed_sd = min(dt, BLOCK), math.sqrt(sample.variance)
-            x, y = self._slid = (
-                self._slid[0] + sample.vx * moved,
-                self._slid[1] + sample.vy * moved,
-            )
-        if watch.looks:
-            watch.readings.append((time, x, y, sample.fx, sample.fy, sample.fz))
-        if time < watch.end:
-            return
-        was = watch.axes.doubt.code
-        known = (offset.x, offset.y) if offset.known else None
-        if watch.end_block(time, sample.z, force, known, self.stands, speed_sd):
+        watch, was = self.watch, self.watch.axes.doubt.code
+        if watch.update(time, dt, sample, force, self._offset, self.stands):
             self._faults.set_noise(watch.force.white, watch.position.white)
             self.slip.set_noise(watch.position.noise, watch.force.noise)
         if watch.axes.doubt.code and not was:

@@ -8,12 +8,16 @@ from collections import deque
 from collections.abc import Sequence
 from itertools import compress, pairwise
 from operator import mul, sub
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ros_pad.estimation.axes import BLOCK, LONGEST, Axes, Vector
 from ros_pad.estimation.ground import LONGEST_GAP
 from ros_pad.estimation.noise import Meter, changes
+
+if TYPE_CHECKING:
+    from ros_pad.estimation.track import Offset, Sample
 
 EAGER, PAUSE = 10, 8
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
@@ -49,6 +53,8 @@ class Watch:
         Normal force in stance, N.
     axes : Axes
         Doubt of the axes.
+    joints : bool
+        Whether motion is the sum of measured velocities.
 
     Attributes
     ----------
@@ -56,20 +62,22 @@ class Watch:
         Noise of a coordinate, m, and of a component of the force, N.
     axes : Axes
         As given.
-    end : float
-        Time at which the present block ends, s.
-    readings : list of tuple
-        Time, s, position x and y, m, and force, N, since the last block, and two before them.
     looks : bool
         Whether noise is measured, and motions are compared, in this stance.
     """
 
     def __init__(
-        self, position_noise: float, force_noise: float, expected_load: float, axes: Axes
+        self,
+        position_noise: float,
+        force_noise: float,
+        expected_load: float,
+        axes: Axes,
+        joints: bool,
     ) -> None:
         self.position, self.force = Meter(position_noise), Meter(force_noise)
         self._steady = STEADY * expected_load
         self.axes = axes
+        self._slid = (0.0, 0.0) if joints else None  # so far, m
         self._blocks: deque[tuple[Sequence[float], int]] = deque(maxlen=2 * LAG + 1)
         self._measured = 0  # blocks
         self._looked, self.looks, self._look_end = 0, False, math.inf
@@ -78,8 +86,9 @@ class Watch:
     def restart(self) -> None:
         """Forget the last readings, and the height of the last stance."""
         self.axes.restart()
-        self.end = -math.inf
-        self.readings: list[tuple[float, ...]] = []
+        self._end = -math.inf
+        # Time, s, position, m, and force, N, since the last block, and two before them.
+        self._readings: list[tuple[float, ...]] = []
         self._earlier = 0  # readings before the block
 
     def look(self, time: float) -> None:
@@ -90,54 +99,54 @@ class Watch:
         self._looked += 1
         self.looks = self._looked <= EAGER or self._looked % PAUSE == 0
         self._look_end = time + LONGEST
-        self.readings, self._earlier = [], 0
+        self._readings, self._earlier = [], 0
         self._blocks.clear()
 
-    def end_block(
-        self,
-        time: float,
-        height: float,
-        force: Vector,
-        offset: tuple[float, float] | None,
-        stands: bool,
-        speed_sd: float | None,
+    def update(
+        self, time: float, dt: float, sample: Sample, force: Vector, offset: Offset, stands: bool
     ) -> bool:
-        """Look at the readings of a block that ends now; return whether noise was measured.
+        """Look at a sample, and at the block that may end with it; return if noise was measured.
 
         Parameters
         ----------
-        time : float
-            Time, s.
-        height : float
-            Height of the position, m.
+        time, dt : float
+            Time of the sample, and since the one before, s.
+        sample : Sample
+            The sample.
         force : tuple of float
-            Force without offset, N.
-        offset : tuple of float or None
-            Offset of the horizontal force, N; None if it is not known.
+            Its force without offset, N.
+        offset : Offset
+            Offset of the force.
         stands : bool
             Whether the foot stood until now.
-        speed_sd : float or None
-            With joints, standard deviation of the velocity, m/s; infinite if it must not be used.
         """
-        block, earlier = self.readings, self._earlier
-        duration = time - self.end + BLOCK
-        self.readings, self._earlier = block[-2:], min(2, len(block))
-        self.end = time + BLOCK - 1e-9
-        if duration > BLOCK + LONGEST_GAP or speed_sd == math.inf:
+        if self._slid:
+            moved = min(dt, BLOCK)
+            self._slid = self._slid[0] + sample.vx * moved, self._slid[1] + sample.vy * moved
+        if self.looks:
+            place = self._slid or (sample.x, sample.y)
+            self._readings.append((time, *place, sample.fx, sample.fy, sample.fz))
+        if time < self._end:
+            return False
+        block, earlier = self._readings, self._earlier
+        duration = time - self._end + BLOCK
+        self._readings, self._earlier = block[-2:], min(2, len(block))
+        self._end = time + BLOCK - 1e-9
+        if duration > BLOCK + LONGEST_GAP or sample.variance == math.inf:
             self.axes.restart()
             return False
-        loaded = self.axes.update(duration, height, force)
+        loaded = self.axes.update(duration, sample.z, force)
         measured, count = False, len(block) - earlier
         if self.looks and count:
             columns = [*zip(*block, strict=True)]
             means = [sum(each[earlier:]) / count for each in columns[1:]]
             measured = stands and self._measure(columns, means, count)
-            if loaded and offset:
+            if loaded and offset.known:
                 sd = self.position.noise * math.sqrt(2.0 / count)
-                if speed_sd is not None:
-                    sd = speed_sd * BLOCK
-                place, pull = np.array(means[:2]), np.array(means[2:4]) - offset
-                self.axes.compare(columns[0][-1], duration, place, pull, sd)
+                if self._slid:
+                    sd = math.sqrt(sample.variance) * BLOCK
+                pull = np.array(means[2:4]) - (offset.x, offset.y)
+                self.axes.compare(columns[0][-1], duration, np.array(means[:2]), pull, sd)
         if stands and time > self._look_end:
             self.look(time)
         return measured

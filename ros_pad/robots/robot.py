@@ -32,7 +32,6 @@ LONGEST = 5.0
 HEAVIEST = 2000.0
 
 _METRES, _KILOGRAMS = 'm (not mm)', 'kg (not g)'  # of a file in other units, values are refused
-_DOWN = np.array((0.0, 0.0, -9.81))
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -242,49 +241,6 @@ class Robot:
         """
         return self.kinematics(q).positions
 
-    def foot_jacobians(self, q: npt.ArrayLike) -> Array:
-        """Return the feet's velocities for each joint velocity.
-
-        Parameters
-        ----------
-        q : array (joints,) or (legs, joints a leg)
-            Joint positions, rad (m where a joint slides).
-
-        Returns
-        -------
-        array (legs, 3, joints)
-            Jacobians, m/rad (no unit where a joint slides).
-
-        Raises
-        ------
-        InvalidInput
-            When ``q`` has another shape or values that are not finite.
-        """
-        return self.kinematics(q).jacobians
-
-    def gravity_torques(self, q: npt.ArrayLike, gravity: npt.ArrayLike = _DOWN) -> Array:
-        """Return the joint torques that hold the links of the legs up.
-
-        Parameters
-        ----------
-        q : array (joints,) or (legs, joints a leg)
-            Joint positions, rad (m where a joint slides).
-        gravity : array (3,)
-            Acceleration of gravity in the axes of the base, m/s².
-
-        Returns
-        -------
-        array (legs, joints)
-            Torques, N m (forces, N, where joints slide).
-
-        Raises
-        ------
-        InvalidInput
-            When an argument has another shape or values that are not finite.
-        """
-        pull = _in_shape('gravity', quantity('gravity', gravity, 'm/s²', -100.0, 100.0), (3,))
-        return self.chains.gravity_torques(self.kinematics(q), pull)
-
     def joint_positions(self, feet: npt.ArrayLike, near: npt.ArrayLike | None = None) -> Array:
         """Return joint positions that bring the feet to places.
 
@@ -310,8 +266,9 @@ class Robot:
         -----
         Newton's method with damped least squares.
         """
-        places = quantity('feet', feet, 'm', -100.0, 100.0)
-        goal = _in_shape('feet', places, (len(self.legs), 3))
+        goal = quantity('feet', feet, 'm', -100.0, 100.0)
+        if goal.shape != (shape := (len(self.legs), 3)):
+            raise InvalidInput(f'feet of shape {goal.shape} is not allowed: {shape} is needed')
         q = self._shaped(self.home if near is None else near).copy()
         for _ in range(50):
             found = self.chains.solve(q)
@@ -337,13 +294,6 @@ class Robot:
                 ' needed'
             )
         return checked.reshape(self.home.shape)
-
-
-def _in_shape(name: str, value: Array, shape: tuple[int, ...]) -> Array:
-    """Return an array; raise `InvalidInput` if it has another shape."""
-    if value.shape != shape:
-        raise InvalidInput(f'{name} of shape {value.shape} is not allowed: {shape} is needed')
-    return value
 
 
 def _check_sizes(robot: Robot) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -64,36 +65,9 @@ class BodyEstimator:
     ----------
     robot : Robot
         The robot whose sensors are read.
-    gyro_noise : float
-        Standard deviation of a sample of the gyro, rad/s, 1e-6 to 1.
-    accelerometer_noise : float
-        Of the accelerometer, m/s², 1e-6 to 10.
-    encoder_noise : float
-        Of a joint position, rad, 1e-6 to 0.1.
-    velocity_noise : float
-        Of a joint velocity, rad/s, 1e-6 to 10.
-    force_noise : float
-        Of a component of a foot's force, N, 0 to 100.
-    accelerometer_bias : float
-        Standard deviation of the accelerometer's bias, m/s², 0 to 5.
-    contact_share : float
-        Share of the expected load above which a foot stands, 0 to 0.9; 0 means 0.1, and 0.25
-        where the force comes from joint torques. The expected load is the weight over half of the
-        legs.
-    window : float
-        Length of the window of slip velocities, s, 0 to 1.
-    rate : float
-        Most samples a second that are expected, Hz, 10 to 10000: with more, the window is shorter.
-    force_axes : str
-        ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
-        of the feet.
-    radius_error : float
-        Standard deviation of the radius with which feet roll, as a share of the robot's
-        ``foot_radius``, 0 to 1: soft feet sink in.
-    length_error : float
-        Standard deviation of the relative error of the length of all legs, 0 to 0.5.
-    rejection : bool
-        Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
+    **settings
+        Noise of the sensors, and how forces are used: by the names, and with the defaults, of
+        :class:`ros_pad.sensing.motion.Given`.
 
     Raises
     ------
@@ -119,44 +93,12 @@ class BodyEstimator:
     (True, [False, False, False, False])
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        gyro_noise: float = 0.005,
-        accelerometer_noise: float = 0.05,
-        encoder_noise: float = 5e-4,
-        velocity_noise: float = 0.03,
-        force_noise: float = 0.3,
-        accelerometer_bias: float = 0.05,
-        contact_share: float = 0.0,
-        window: float = 0.02,
-        rate: float = 1000.0,
-        force_axes: str = 'base',
-        radius_error: float = 0.05,
-        length_error: float = 0.003,
-        rejection: bool = True,
-    ) -> None:
+    def __init__(self, robot: Robot, **settings: Any) -> None:
         instance('robot', robot, Robot)
         if not robot.mass > 0.0:
             raise InvalidInput(f'robot {robot.name!r} is not allowed: its links have no mass')
         self._robot = robot
-        number('radius_error', radius_error, '(share)', 0.0, 1.0)
-        number('length_error', length_error, '(share)', 0.0, 0.5)
-        self._given = motion.Given(
-            gyro_noise=gyro_noise,
-            accelerometer_noise=accelerometer_noise,
-            encoder_noise=encoder_noise,
-            velocity_noise=velocity_noise,
-            force_noise=force_noise,
-            accelerometer_bias=accelerometer_bias,
-            contact_share=contact_share,
-            window=window,
-            rate=rate,
-            force_axes=force_axes,
-            radius_error=radius_error * robot.foot_radius,
-            length_error=length_error,
-            rejection=rejection,
-        )
+        self._given = motion.Given(**settings)
         for setting in SETTINGS:
             if setting.name != 'forces':
                 setting.accept(getattr(self._given, setting.name))
@@ -165,7 +107,8 @@ class BodyEstimator:
         to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
         hips = np.concatenate([robot.hips, np.ones((len(robot.legs), 1))], axis=1)
         load = robot.mass * WEIGHT / (0.5 * len(robot.legs))
-        self._body = motion.Body(errors, to_imu, (hips @ to_imu.T)[:, :3], load)
+        sizes = (0.05 * robot.foot_radius, 0.003) if self._given.sizes else (0.0, 0.0)
+        self._body = motion.Body(errors, to_imu, (hips @ to_imu.T)[:, :3], load, sizes)
         self._reset()
 
     def _reset(self) -> None:
@@ -173,10 +116,7 @@ class BodyEstimator:
         robot, given, legs = self._robot, self._given, len(self._robot.legs)
         gate = GATE if given.rejection else math.inf
         self._filter = BodyFilter(legs, given.gyro_noise, given.accelerometer_noise, gate)
-        samples = max(1, round(given.window * given.rate))
-        self._window = SlipWindow(
-            legs, given.window, samples, given.encoder_noise, given.velocity_noise
-        )
+        self._window = SlipWindow(legs, given.encoder_noise, given.velocity_noise)
         self._time = math.nan
         self._step = 0.0  # the last one, s
         self._feet = motion.Feet(legs)
@@ -188,7 +128,8 @@ class BodyEstimator:
             Delay(given.gyro_noise),
             Unloaded(robot.legs, self._body.load),
         )
-        self._length = motion.Length()
+        # Whether legs are of another length than in the file, and when it is looked at again.
+        self._stretched, self._look = False, math.nan
         self._rests = motion.Rest()
         self._pull = WEIGHT  # mean size of the specific force, m/s²
 
@@ -310,7 +251,7 @@ class BodyEstimator:
         body.spread(
             *((tilt + 2e-3, 0.02) if calm else (0.2, 0.5)),
             *(UNKNOWN_BIAS, max(given.accelerometer_bias, 1e-3)),
-            *(given.radius_error, given.length_error),
+            *self._body.sizes,
         )
         body.radius = self._robot.foot_radius
         # The least rotation that turns the reading of the IMU upright, then the base to x.
@@ -481,21 +422,19 @@ class BodyEstimator:
 
         Return whether what was learnt about them was discarded.
         """
-        feet, legs, given = self._feet, self._checks.legs, self._given
+        feet, legs, (radius_error, length_error) = self._feet, self._checks.legs, self._body.sizes
         changed = legs.update(dt, feet.standing, feet.left_out, slips, moves)
         if changed or self._checks.unloaded.found:
             # What such legs, or feet that were in the air, have shown is wrong.
-            self._filter.reshape(
-                self._robot.foot_radius, given.radius_error, 0.0, given.length_error
-            )
+            self._filter.reshape(self._robot.foot_radius, radius_error, 0.0, length_error)
             return True
         self._filter.creep = 0.03 * legs.slippery  # m after 1 s
         # Joints that are late look like legs of another length, too.
-        if time < self._length.look or self._checks.delay.doubt():
+        if time < self._look or self._checks.delay.doubt():
             return False
-        self._length.look = time + 0.25
+        self._look = time + 0.25
         scale, deviation = self._filter.scale, self._filter.deviations[1]
-        if self._length.stretched:
+        if self._stretched:
             if deviation > KNOWN_LENGTH:
                 self._doubts.add(
                     time,
@@ -503,16 +442,16 @@ class BodyEstimator:
                     f' robot, by {100.0 * scale:.0f} +- {100.0 * deviation:.0f} %',
                 )
             return False
-        learnt = given.length_error**2 - deviation**2
+        learnt = length_error**2 - deviation**2
         # Feet that slip for most of their stances look like legs of another length. Walking must
         # have shown something about it.
-        if not legs.sticks or learnt <= 0.05 * given.length_error**2:
+        if not legs.sticks or learnt <= 0.05 * length_error**2:
             return False
-        most = max(WRONG_LENGTH * learnt / given.length_error**2, 4.0 * math.sqrt(learnt))
-        self._length.stretched = abs(scale) > most
-        if self._length.stretched:
-            self._filter.reshape(self._robot.foot_radius, given.radius_error, 0.0, 0.05)
-        return self._length.stretched
+        most = max(WRONG_LENGTH * learnt / length_error**2, 4.0 * math.sqrt(learnt))
+        self._stretched = abs(scale) > most
+        if self._stretched:
+            self._filter.reshape(self._robot.foot_radius, radius_error, 0.0, 0.05)
+        return self._stretched
 
     def _rest(self, sample: Sample) -> None:
         """Average the gyro while nothing moves, and correct its bias."""

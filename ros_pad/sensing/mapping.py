@@ -146,8 +146,11 @@ class Mapping:
         self.name = name
         self.sources = tuple(sources)
         self.force_axes = axes
-        self.missing = (*_missing(self.sources), *notes)
-        self.force_kind = next(iter(_force_kinds(self.sources)), '')
+        gives = frozenset().union(*(source.gives for source in sources))
+        kinds = (kind for kind in ('vector', 'normal', 'contact') if kind in gives)
+        self.force_kind = next(kinds, '')
+        arrive = [source.topic for source in sources if 'stamps' not in source.gives]
+        self.missing = (*_missing(gives, self.force_kind, arrive), *notes)
         self._sources = {source.topic.lstrip('/'): source for source in sources}
 
     @classmethod
@@ -223,38 +226,32 @@ class Mapping:
             raise InvalidInput(f'{topic} ({source.type_name}): {error}') from error
 
 
-def _force_kinds(sources: Sequence[Source]) -> list[str]:
-    """Return the kinds of forces that topics give, the best one first."""
-    kinds = ('vector', 'normal', 'contact')
-    return [kind for kind in kinds if any(kind in source.gives for source in sources)]
+def _missing(gives: frozenset[str], forces: str, arrive: Sequence[str]) -> list[str]:
+    """Return what is not given, and what follows from that.
 
-
-def _missing(sources: Sequence[Source]) -> list[str]:
-    """Return what no topic gives, and what follows from that."""
-    gives = frozenset().union(*(source.gives for source in sources))
-    found = []
-    for kind, what in (
-        ('gyro', 'gyro: no topic has raw angular velocity'),
-        ('accelerometer', 'accelerometer: no topic has specific force'),
-        ('positions', 'joints: no topic has positions'),
-    ):
-        if kind not in gives:
-            found.append(f'{what}; the body estimator cannot run without')
-    if 'velocities' not in gives and 'positions' in gives:
-        found.append('joint velocities: differences of positions replace them, with more noise')
-    forces = _force_kinds(sources)
-    if not forces and 'efforts' not in gives:
-        found.append(
-            'force: neither foot forces nor efforts; contact and friction are unobservable'
-        )
-    elif forces[:1] == ['normal']:
-        found.append('friction: unobservable, the force has one axis')
-    elif forces == ['contact']:
-        found.append('friction: unobservable, there are flags of contact and no forces')
-    if late := [source.topic for source in sources if 'stamps' not in source.gives]:
-        text = f'{", ".join(late)} has none; delays of its messages are not corrected'
-        found.append(f'stamps: {text}')
-    return found
+    ``forces`` is the kind of the forces, and ``arrive`` are the topics without stamps.
+    """
+    must = 'the body estimator cannot run without'
+    found = (
+        ('gyro' in gives, f'gyro: no topic has raw angular velocity; {must}'),
+        ('accelerometer' in gives, f'accelerometer: no topic has specific force; {must}'),
+        ('positions' in gives, f'joints: no topic has positions; {must}'),
+        (
+            'velocities' in gives or 'positions' not in gives,
+            'joint velocities: differences of positions replace them, with more noise',
+        ),
+        (
+            forces or 'efforts' in gives,
+            'force: neither foot forces nor efforts; contact and friction are unobservable',
+        ),
+        (forces != 'normal', 'friction: unobservable, the force has one axis'),
+        (forces != 'contact', 'friction: unobservable, there are flags of contact and no forces'),
+        (
+            not arrive,
+            f'stamps: {", ".join(arrive)} has none; delays of its messages are not corrected',
+        ),
+    )
+    return [text for there, text in found if not there]
 
 
 def _sources(part: Table, pattern: str, robot: Robot) -> list[Source]:
@@ -429,7 +426,7 @@ def _named(row: Table, known: Sequence[str]) -> tuple[_Read, list[str], Array, A
 def _feet(row: Table, robot: Robot) -> tuple[Array, tuple[str, ...]]:
     """Read the legs of places of feet; return what zeroes them, and the order of the joints."""
     zero = np.zeros(robot.home.size)
-    lines = robot.foot_jacobians(zero)
+    lines = robot.kinematics(zero).jacobians
     if lines.shape != (len(robot.legs), 3, 3) or np.abs(lines - np.eye(3)).max() > 1e-9:
         raise ConfigError(
             f'{row.origin}: places of feet need a robot whose legs slide along x, y and z,'

@@ -31,7 +31,7 @@ class FootMotion(NamedTuple):
     in_contact : bool
         Whether the foot carries load.
     slip_velocity : array (2,)
-        Velocity of the contact point, x and y, m/s: mean of the last samples, see ``window``.
+        Velocity of the contact point, x and y, m/s: mean of the last 20 ms.
     slip_velocity_sd : float
         Standard deviation of each of its components, m/s. It includes that of the body's
         velocity, which is common to all feet and lasts for about a stance.
@@ -80,21 +80,46 @@ class BodyEstimate(NamedTuple):
 
 
 class Given(NamedTuple):
-    """Arguments of a body estimator; ``radius_error`` in m."""
+    """Settings of a body estimator.
 
-    gyro_noise: float
-    accelerometer_noise: float
-    encoder_noise: float
-    velocity_noise: float
-    force_noise: float
-    accelerometer_bias: float
-    contact_share: float
-    window: float
-    rate: float
-    force_axes: str
-    radius_error: float
-    length_error: float
-    rejection: bool
+    Attributes
+    ----------
+    gyro_noise : float
+        Standard deviation of a sample of the gyro, rad/s, 1e-6 to 1.
+    accelerometer_noise : float
+        Of the accelerometer, m/s², 1e-6 to 10.
+    encoder_noise : float
+        Of a joint position, rad, 1e-6 to 0.1.
+    velocity_noise : float
+        Of a joint velocity, rad/s, 1e-6 to 10.
+    force_noise : float
+        Of a component of a foot's force, N, 0 to 100.
+    accelerometer_bias : float
+        Standard deviation of the accelerometer's bias, m/s², 0 to 5.
+    contact_share : float
+        Share of the expected load above which a foot stands, 0 to 0.9; 0 means 0.1, and 0.25
+        where the force comes from joint torques. The expected load is the weight over half of the
+        legs.
+    force_axes : str
+        ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
+        of the feet.
+    sizes : bool
+        Whether the radius with which feet roll (soft feet sink in), and the relative error of the
+        length of all legs are estimated; otherwise they are those of the robot.
+    rejection : bool
+        Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
+    """
+
+    gyro_noise: float = 0.005
+    accelerometer_noise: float = 0.05
+    encoder_noise: float = 5e-4
+    velocity_noise: float = 0.03
+    force_noise: float = 0.3
+    accelerometer_bias: float = 0.05
+    contact_share: float = 0.0
+    force_axes: str = 'base'
+    sizes: bool = True
+    rejection: bool = True
 
 
 class Sample(NamedTuple):
@@ -115,6 +140,7 @@ class Body(NamedTuple):
     to_imu: Array  # (4, 4)
     hips: Array  # (legs, 3), from the IMU, m
     load: float  # N, that a foot is expected to carry
+    sizes: tuple[float, float]  # deviations of the radius of rolling, m, and of lengths, relative
 
 
 class Checks(NamedTuple):
@@ -154,14 +180,6 @@ class Doubts:
     def add(self, time: float, reason: str) -> None:
         """Begin a doubt."""
         self.until, self.reason = time + self.lasts, reason
-
-
-@dataclass
-class Length:
-    """Whether legs are of another length than in the file of the robot."""
-
-    stretched: bool = False
-    look: float = math.nan  # when it is looked at again
 
 
 @dataclass

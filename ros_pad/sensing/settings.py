@@ -40,6 +40,4 @@ SETTINGS = (
         'Share of the expected load above which a foot stands; 0: 0.1, and 0.25 for efforts.',
         '', 0.0, 0.9,
     ),
-    Setting('window', 0.02, 'Time over which slip velocities are averaged.', 's', 0.0, 1.0),
-    Setting('rate', 250.0, 'Samples a second that are expected.', 'Hz', 10.0, 1e4),
 )  # fmt: skip

@@ -10,9 +10,12 @@ import numpy.typing as npt
 
 from ros_pad.robots.rotation import Array
 
-# Length of the short window over that of the long one: whether a foot has come to rest is known
+# Largest length of the window, and of its last part, s: whether a foot has come to rest is known
 # sooner than its speed.
-SHORT = 0.4
+LENGTHS = 0.02, 0.4 * 0.02
+
+# Samples that are kept: with more than 1000 a second the window is shorter.
+_KEPT = 21
 
 
 class SlipWindow:
@@ -27,10 +30,6 @@ class SlipWindow:
     ----------
     legs : int
         Number of legs.
-    length : float
-        Largest length of the window, s.
-    samples : int
-        Largest number of intervals that it can have.
     encoder_noise, velocity_noise : float
         Standard deviations of joint positions, rad, and joint velocities, rad/s.
 
@@ -44,22 +43,18 @@ class SlipWindow:
         Variance of the mean of the horizontal velocities, as they vary in the window, m²/s².
     """
 
-    def __init__(
-        self, legs: int, length: float, samples: int, encoder_noise: float, velocity_noise: float
-    ) -> None:
+    def __init__(self, legs: int, encoder_noise: float, velocity_noise: float) -> None:
         self.velocity = self.latest = np.zeros((legs, 3))
         self.lever_noise = self.latest_noise = np.full(legs, velocity_noise)
         self.unsteady = np.zeros(legs)
         self._positions, self._velocities = 2.0 * encoder_noise**2, velocity_noise**2
-        self._lengths = length, SHORT * length
         self._begins = np.zeros(legs, dtype=np.int64)  # count at which the window began
-        size = samples + 1
         self._count = 0
         self._firsts = [0, 0]  # counts of the first samples within the lengths
         self._path = np.zeros((legs, 3))
         self._sums = np.zeros((legs, 3, 3))  # place over the ground; velocities; their squares
-        self._ring = np.zeros((size, legs, 3, 3))
-        self._times = np.full(size, -math.inf)
+        self._ring = np.zeros((_KEPT, legs, 3, 3))
+        self._times = np.full(_KEPT, -math.inf)
 
     def update(
         self,
@@ -85,17 +80,16 @@ class SlipWindow:
             Feet whose window begins with this sample.
         """
         self._count += 1
-        size = len(self._times)
-        now = self._count % size
+        now = self._count % _KEPT
         self._path += moved
         self._sums[:, 0] = self._path + places
         self._sums[:, 1] += slip
         self._sums[:, 2] += slip * slip
         self._ring[now], self._times[now] = self._sums, time
         self._begins[begins] = self._count
-        for index, length in enumerate(self._lengths):
-            first = max(self._firsts[index], self._count - size + 1)
-            while time - self._times[first % size] > 1.001 * length:  # but for rounding
+        for index, length in enumerate(LENGTHS):
+            first = max(self._firsts[index], self._count - _KEPT + 1)
+            while time - self._times[first % _KEPT] > 1.001 * length:  # but for rounding
                 first += 1
             self._firsts[index] = first
         self._average(time, slip)
@@ -103,7 +97,7 @@ class SlipWindow:
     def _average(self, time: float, slip: Array) -> None:
         """Take the means over both windows, the longer one first."""
         firsts = np.maximum(self._begins, np.array(self._firsts)[:, None])  # (2, legs)
-        rows = firsts % len(self._times)
+        rows = firsts % _KEPT
         change, total, squares = (
             self._sums - self._ring[rows, np.arange(len(self._begins))]
         ).transpose(2, 0, 1, 3)

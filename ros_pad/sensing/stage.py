@@ -104,12 +104,6 @@ def twist_of(estimate: BodyEstimate, rate: Array, gyro_noise: float) -> tuple[Ar
     return np.concatenate([to_base @ estimate.velocity, rate]), covariance
 
 
-class _Inertial(NamedTuple):
-    stamp_ns: int
-    gyro: Array
-    accelerometer: Array
-
-
 class _Joints(NamedTuple):
     stamp_ns: int
     positions: Array
@@ -137,7 +131,6 @@ class _Since:
 
     silent_ns: int | None = None  # when that was noted first
     rejection: str = ''
-    unpaired_ns: float = math.inf  # stamp of the first joints without partner
     received: Counter[str] = field(default_factory=Counter)  # readings, by source
     fresh: Counter[str] = field(default_factory=Counter)  # of those, how many had a new stamp
 
@@ -206,7 +199,8 @@ class SensingStage:
         self.doubt: str | None = None
         self.differentiates = False
         self.force_source = ''
-        self._inertial: deque[_Inertial] = deque(maxlen=_WAITING)
+        # Stamps, and gyro and accelerometer in one array.
+        self._inertial: deque[tuple[int, Array]] = deque(maxlen=_WAITING)
         self._waiting: deque[_Joints] = deque(maxlen=_WAITING)
         self._last_positions: tuple[int, Array] | None = None
         self._forces: list[deque[tuple[int, Array]]] = [deque(maxlen=_WAITING) for _ in robot.legs]
@@ -228,9 +222,9 @@ class SensingStage:
         given = self._checked(
             ('gyro', gyro, 3, 'rad/s'), ('accelerometer', accelerometer, 3, 'm/s2')
         )
-        last_ns = self._inertial[-1].stamp_ns if self._inertial else _NEVER
+        last_ns = self._inertial[-1][0] if self._inertial else _NEVER
         if given and self._fresh('IMU', stamp_ns, last_ns, self._inertial):
-            self._inertial.append(_Inertial(stamp_ns, *given))
+            self._inertial.append((stamp_ns, np.concatenate(given)))
             self._process()
 
     def joints(
@@ -360,10 +354,8 @@ class SensingStage:
         if not self._waiting and self.differentiates:
             return f'no joints: no two readings in {LONGEST_DIFFERENCE:g} s, without velocities'
         assert self._last_positions
-        return self._apart(self._last_positions[0])
-
-    def _apart(self, stamp_ns: int) -> str:
-        nearest = min((each.stamp_ns - stamp_ns for each in self._inertial), key=abs, default=0)
+        stamp_ns = self._last_positions[0]
+        nearest = min((each[0] - stamp_ns for each in self._inertial), key=abs, default=0)
         return f'stamps: IMU and joints are {abs(nearest) * 1e-6:.3g} ms apart'
 
     def _process(self) -> None:
@@ -372,14 +364,10 @@ class SensingStage:
             joints = self._waiting[0]
             found = self._inertial_at(joints.stamp_ns)
             if found is None:
-                last_ns = self._inertial[-1].stamp_ns if self._inertial else -math.inf
+                last_ns = self._inertial[-1][0] if self._inertial else _NEVER
                 if last_ns < joints.stamp_ns and len(self._waiting) < _WAITING:
                     return  # the IMU may be late
                 self._waiting.popleft()
-                self._since.unpaired_ns = min(self._since.unpaired_ns, joints.stamp_ns)
-                # After a silence of the IMU a few readings of joints have no partner.
-                if joints.stamp_ns - self._since.unpaired_ns > 2 * _LATEST_NS:
-                    self._update_doubt(self._apart(joints.stamp_ns))
                 continue
             if not self._has_forces(joints.stamp_ns) and len(self._waiting) == 1:
                 return
@@ -387,15 +375,17 @@ class SensingStage:
             if self.samples or self._starts(joints, found):
                 self._update(joints, found)
 
-    def _inertial_at(self, stamp_ns: int) -> _Inertial | None:
+    def _inertial_at(self, stamp_ns: int) -> Array | None:
         """Return the reading of the IMU at a time, or one interpolated between its neighbours."""
-        after: _Inertial | None = None
-        for reading in reversed(self._inertial):
-            if abs(reading.stamp_ns - stamp_ns) <= SAME_NS:
-                return reading
-            if reading.stamp_ns < stamp_ns:
-                return after and _between(reading, after, stamp_ns)
-            after = reading
+        after_ns, after = 10**18, np.zeros(6)
+        for before_ns, values in reversed(self._inertial):
+            if abs(before_ns - stamp_ns) <= SAME_NS:
+                return values
+            if before_ns < stamp_ns:
+                length = after_ns - before_ns
+                share = (stamp_ns - before_ns) / length
+                return values + share * (after - values) if length <= 10_000_000 else None
+            after_ns, after = before_ns, values
         return None
 
     def _has_forces(self, stamp_ns: int) -> bool:
@@ -416,17 +406,17 @@ class SensingStage:
             found.append(force)
         return np.array(found)
 
-    def _starts(self, joints: _Joints, inertial: _Inertial) -> bool:
+    def _starts(self, joints: _Joints, inertial: Array) -> bool:
         """Return whether estimation may begin: the robot is calm, or has not been for long."""
-        pull = abs(math.sqrt(inertial.accelerometer @ inertial.accelerometer) - WEIGHT)
-        calm = pull < 0.5 and np.abs(inertial.gyro).max() < 0.1  # m/s2 and rad/s
+        pull = abs(math.sqrt(inertial[3:] @ inertial[3:]) - WEIGHT)
+        calm = pull < 0.5 and np.abs(inertial[:3]).max() < 0.1  # m/s2 and rad/s
         calm = calm and np.abs(joints.velocities).max() < 0.3
         self._start.calm = self._start.calm + 1 if calm else 0
         self._start.first_ns = min(self._start.first_ns, joints.stamp_ns)
         # One reading in a jolt would begin odom with a wrong tilt.
         return self._start.calm >= 5 or joints.stamp_ns - self._start.first_ns >= 200_000_000
 
-    def _update(self, joints: _Joints, inertial: _Inertial) -> None:
+    def _update(self, joints: _Joints, inertial: Array) -> None:
         """Process a sample."""
         stamp_ns = joints.stamp_ns
         efforts, self.force_source = None, ''
@@ -438,8 +428,8 @@ class SensingStage:
         try:
             estimate = self.estimator.update(
                 stamp_ns * 1e-9,
-                inertial.gyro,
-                inertial.accelerometer,
+                inertial[:3],
+                inertial[3:],
                 joints.positions,
                 joints.velocities,
                 forces,
@@ -467,19 +457,6 @@ class SensingStage:
         # Details, after the colon, may change with every sample.
         if before is None or doubt.partition(':')[0] != before.partition(':')[0]:
             self._out.doubt(doubt)
-
-
-def _between(before: _Inertial, after: _Inertial, stamp_ns: int) -> _Inertial | None:
-    """Return the reading at a time between two others, or None if these are too far apart."""
-    length = after.stamp_ns - before.stamp_ns
-    if length > 10_000_000:
-        return None
-    share = (stamp_ns - before.stamp_ns) / length
-    return _Inertial(
-        stamp_ns,
-        before.gyro + share * (after.gyro - before.gyro),
-        before.accelerometer + share * (after.accelerometer - before.accelerometer),
-    )
 
 
 def _finite(estimate: BodyEstimate) -> bool:

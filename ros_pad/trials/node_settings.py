@@ -78,7 +78,6 @@ def body_settings_for(scene: Scene) -> dict[str, Any]:
         'encoder_noise': sensors.encoder,
         'velocity_noise': sensors.joint_velocity,
         'force_noise': sensors.force,
-        'rate': sensors.rate,
     }
 
 

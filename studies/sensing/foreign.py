@@ -163,9 +163,8 @@ def measure(recording: Recording) -> list[Row]:
     walks = (time >= fast[0]) & (time <= fast[-1])
     rows = []
     for method in METHODS:
-        fixed = {'radius_error': 0.0, 'length_error': 0.0}
         track = (
-            estimated(recording.robot, log, course, **fixed)
+            estimated(recording.robot, log, course, sizes=False)
             if method == FIXED
             else track_of(recording.robot, log, course, method)
         )

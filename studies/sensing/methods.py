@@ -85,8 +85,7 @@ def track_of(robot: Robot, log: Log, course: Course, method: str) -> Track:
         return estimated(robot, log, course)
     if method == 'no rejection':
         # Slips would look like feet and legs of another size.
-        fixed = {'radius_error': 0.0, 'length_error': 0.0}
-        return estimated(robot, log, course, rejection=False, **fixed)
+        return estimated(robot, log, course, rejection=False, sizes=False)
     begin = time.process_time()
     if method in rivals.FILTERS:
         rows = rivals.FILTERS[method](robot, course).rows(log)

@@ -97,10 +97,10 @@ def slid(robot: Robot, log: Log, speeds: Array) -> Log:
         before = joints[row].reshape(robot.home.shape)
         change = away @ turn
         after = robot.joint_positions(robot.foot_positions(before) + change, near=before)
-        speed = robot.foot_jacobians(before) @ rates[row].reshape(*before.shape, 1)
+        speed = robot.kinematics(before).jacobians @ rates[row].reshape(*before.shape, 1)
         speed[..., 0] += moves @ turn - cross(robot.imu[:3, :3] @ log.gyro[row], change)
         joints[row] = after.ravel()
-        rates[row] = np.linalg.solve(robot.foot_jacobians(after), speed).ravel()
+        rates[row] = np.linalg.solve(robot.kinematics(after).jacobians, speed).ravel()
     slip = np.full_like(log.slip, np.nan)
     return dataclasses.replace(
         log, joint_positions=joints, joint_velocities=rates, slip=slip, feet=feet

@@ -246,7 +246,7 @@ def walk(course: Course, seed: int, duration: float) -> Log:
             # Set-points lead by what servos need for their damping and for the robot's weight.
             stands = gait.stands(time - REST)
             share = np.where(stands, robot.mass * 9.81 / max(stands.sum(), 1), 0.0)
-            torque = -share[:, None] * robot.foot_jacobians(q)[:, 2]
+            torque = -share[:, None] * robot.kinematics(q).jacobians[:, 2]
             torque += 1.1 * drive.damping * (q - before) * course.rate
             aim = (q + torque / drive.stiffness).ravel()
             data.xfrc_applied[1, :2] = pushes.force(time)

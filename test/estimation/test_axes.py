@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import SENSOR_FAULTS, FootEstimator, doubt
+from ros_pad.estimation import SENSOR_FAULTS, FootEstimator, Tuning, doubt
 from ros_pad.estimation.axes import BLOCK, TURNS, Axes
 from ros_pad.estimation.scales import GRID
 
@@ -51,12 +51,12 @@ POSITIONS = [
 class Walk:
     """A foot that stands for a second and then steps; on the ground it slips, or only shears."""
 
-    def __init__(self, force=RIGHT, position=RIGHT, slip=0.05, ratio=0.2, bias=0.0):
-        self.estimator = FootEstimator(FOOT, LOAD)
+    def __init__(self, force=RIGHT, position=RIGHT, slip=0.05, ratio=0.2, bias=0.0, tuning=None):
+        self.estimator = FootEstimator(FOOT, LOAD, tuning)
         self._axes, self._slip, self._ratio = (force, position), slip, ratio
         self._bias = np.array([bias, -bias, 0.0])
         self._random = np.random.default_rng(1)
-        self._contact, self._time = np.zeros(3), 0.0
+        self._contact, self._time, self._last = np.zeros(3), 0.0, np.zeros(3)
         self.kinds = set()
         for _ in range(250):
             self._sample(np.array([0.0, 0.0, LOAD]))
@@ -66,7 +66,11 @@ class Walk:
         marker = self._contact - np.array([*force[:2], 0.0]) / FOOT.shear_stiffness
         force = self._axes[0] @ (force + self._bias) + 0.03 * self._random.normal(size=3)
         marker = self._axes[1] @ marker + 1.5e-4 * self._random.normal(size=3)
-        estimate = self.estimator.update(self._time, force.tolist(), marker.tolist(), 0.0)
+        velocity, self._last = (self._contact - self._last) / PERIOD, self._contact.copy()
+        estimate = self.estimator.update(
+            self._time, force.tolist(), marker.tolist(), 0.0,
+            velocity=velocity[:2].tolist(), variance=1e-5,
+        )  # fmt: skip
         self.kinds.add(estimate.doubt.partition(':')[0])
         return estimate
 
@@ -103,6 +107,15 @@ def test_turned_axes_are_in_doubt_after_three_stances_with_the_likely_turn(
     assert words in estimate.doubt
     assert 'axes' in SENSOR_FAULTS
     assert not estimate.sound and not estimate.slipping and math.isnan(estimate.margin)
+
+
+@pytest.mark.parametrize('axis', [0, 1])
+def test_a_mirrored_force_is_in_doubt_where_joints_show_the_slip(axis):
+    mirrored = np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))
+    walk = Walk(mirrored, tuning=Tuning(source='joints', pads_shear=False))
+    for heading in HEADINGS * 3:
+        estimate = walk.step(heading)
+    assert f'left-handed, {"xy"[axis]} of force' in estimate.doubt
 
 
 @pytest.mark.parametrize('bias', [0.0, 1.5])

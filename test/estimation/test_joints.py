@@ -10,7 +10,7 @@ import pytest
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import DOUBTS, SENSOR_FAULTS, ContactMotion, FootEstimator, Tuning, doubt
+from ros_pad.estimation import DOUBTS, SENSOR_FAULTS, FootEstimator, Tuning, doubt
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.records import SAMPLE, Block
 
@@ -30,13 +30,11 @@ class Stance:
         self._random = np.random.default_rng(seed)
         self.estimates = []
 
-    def sample(self, ratio, velocity=0.0, doubt='', load=LOAD, place=0.0):
+    def sample(self, ratio, velocity=0.0, known=True):
         self.time += PERIOD
-        force = np.array((-ratio * load, 0.0, load)) + 0.03 * self._random.standard_normal(3)
-        motion = ContactMotion((velocity, 0.0), self.sd, doubt)
-        estimate = self.estimator.update(
-            self.time, force.tolist(), (place, 0.0, 0.0), 0.0, motion=motion
-        )
+        force = np.array((-ratio * LOAD, 0.0, LOAD)) + 0.03 * self._random.standard_normal(3)
+        motion = {'velocity': (velocity, 0.0), 'variance': self.sd**2 if known else math.inf}
+        estimate = self.estimator.update(self.time, force.tolist(), (0, 0, 0), 0.0, **motion)
         self.estimates.append(estimate)
         return estimate
 
@@ -76,7 +74,7 @@ def test_a_body_in_doubt_stops_alarm_and_learning():
     before = stance.estimates[-1]
     assert before.wet_probability < 0.5  # it sticks at more than wet ground holds
     for _ in range(100):
-        estimate = stance.sample(0.12, 0.2, 'slipping: all feet that stand may slip')
+        estimate = stance.sample(0.12, 0.2, known=False)
         assert estimate.doubt == 'motion unknown: the body is in doubt'
         assert not estimate.slipping
         assert estimate.standing
@@ -109,16 +107,15 @@ def test_the_link_above_soft_pads_moves_while_the_contact_sticks(shears, slips):
 @pytest.mark.parametrize(
     ('motion', 'named'),
     [
-        (None, 'motion = None'),
-        (ContactMotion((math.nan, 0.0), 0.01), 'velocity x = nan m/s'),
-        (ContactMotion((0.0, 0.0), math.inf), 'deviation .* = inf '),
-        (ContactMotion((0.0, 0.0), -0.01), 'deviation .* = -0.01 '),
+        ({'velocity': (math.nan, 0.0), 'variance': 1e-4}, 'velocity x = nan m/s'),
+        ({'variance': math.nan}, 'variance = nan '),
+        ({'variance': -0.01}, 'variance = -0.01 '),
     ],
 )
 def test_a_bad_motion_is_refused(motion, named):
     estimator = FootEstimator(FOOT, LOAD, JOINTS)
     with pytest.raises(InvalidInput, match=named):
-        estimator.update(0.004, (0.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0, motion=motion)
+        estimator.update(0.004, (0.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0, **motion)
     assert estimator.estimate.time == -math.inf  # as before
 
 

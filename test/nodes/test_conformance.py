@@ -11,7 +11,7 @@ from ros_pad.configuration import shared_folder
 # A parameter of each node, its text in the shipped file, and its value in a changed copy.
 CHANGED = {
     'simulator': ('seed', '0', 7),
-    'body_estimator': ('rate', '250.0', 500.0),
+    'body_estimator': ('velocity_noise', '0.03', 0.05),
     'estimator': ('wet_prior', '0.5', 0.25),
     'controller': ('margin', '1.2', 1.5),
     'regulator': ('ceiling', '90000.0', 60000.0),

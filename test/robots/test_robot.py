@@ -37,9 +37,9 @@ def test_kinematics_are_those_that_pinocchio_gave():
             np.array(row['rotation']), abs=1e-12
         )
         lines = np.array(row['jacobian'])
-        assert robot.foot_jacobians(Q)[leg] == pytest.approx(lines[:3], abs=1e-12)
+        assert robot.kinematics(Q).jacobians[leg] == pytest.approx(lines[:3], abs=1e-12)
         assert robot.kinematics(Q).angular[leg] == pytest.approx(lines[3:], abs=1e-12)
-    torques = robot.gravity_torques(Q, GRAVITY)
+    torques = robot.chains.gravity_torques(robot.kinematics(Q), GRAVITY)
     assert torques == pytest.approx(np.array(figures['torques']), abs=1e-12)
     assert robot.imu == pytest.approx(np.array(figures['imu']), abs=1e-12)
 
@@ -57,7 +57,7 @@ def test_jacobians_are_derivatives_of_places_and_rotations(name, seed):
         ahead[:, joint] += step
         behind[:, joint] -= step
         line = (robot.foot_positions(ahead) - robot.foot_positions(behind)) / (2 * step)
-        assert robot.foot_jacobians(q)[:, :, joint] == pytest.approx(line, abs=1e-8)
+        assert robot.kinematics(q).jacobians[:, :, joint] == pytest.approx(line, abs=1e-8)
         turn = robot.kinematics(ahead).rotations @ robot.kinematics(behind).rotations.transpose(
             0, 2, 1
         )
@@ -104,6 +104,8 @@ def test_joint_positions_bring_the_feet_to_their_places(name):
     assert robot.foot_positions(q) == pytest.approx(goal, abs=1e-8)
     with pytest.raises(InvalidInput, match='does not reach'):
         robot.joint_positions(goal - 1.0)
+    with pytest.raises(InvalidInput, match='feet of shape'):
+        robot.joint_positions(goal[:, :1])
 
 
 def test_gaits_by_phase():

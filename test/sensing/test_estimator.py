@@ -40,7 +40,7 @@ class Motion:
         self.velocity, self.place = velocity, self.place + mean * DT
         self.feet = self.feet + (slips - mean) * DT
         self.q = self.robot.joint_positions(self.feet, near=self.q)
-        lines = self.robot.foot_jacobians(self.q)
+        lines = self.robot.kinematics(self.q).jacobians
         dq = np.linalg.solve(lines, np.broadcast_to(slips - velocity, (4, 3))[..., None])
         self.time += DT
         return self.read(acceleration, self.q, dq[..., 0], forces)
@@ -140,7 +140,9 @@ def test_rolling_feet_take_the_body_along():
             def rates(q, speed):
                 # J q' = r (w x n) - v with w = Jw q' and n = z, of a ball of 0.022 m.
                 turn = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-                lines = POINTED.foot_jacobians(q) - 0.022 * turn @ POINTED.kinematics(q).angular
+                lines = (
+                    POINTED.kinematics(q).jacobians - 0.022 * turn @ POINTED.kinematics(q).angular
+                )
                 return np.linalg.solve(lines, np.tile(-speed, (4, 1))[..., None])[..., 0]
 
             half = motion.q + 0.5 * DT * rates(motion.q, mean)
@@ -206,8 +208,8 @@ def test_the_place_of_the_imu_does_not_matter():
 def test_forces_from_torques_and_in_the_axes_of_the_feet():
     q = POINTED.home.ravel()
     # Static balance of each leg: torques carry the leg and press the foot on the ground.
-    torques = POINTED.gravity_torques(q)
-    torques = torques - (POINTED.foot_jacobians(q)[:, 2] * STANDING[0, 2])
+    torques = POINTED.chains.gravity_torques(POINTED.kinematics(q), -UP)
+    torques = torques - (POINTED.kinematics(q).jacobians[:, 2] * STANDING[0, 2])
     readings = (np.zeros(3), UP, q, 0.0 * q)
     found = BodyEstimator(POINTED).update(0.0, *readings, efforts=torques.ravel())
     turned = (POINTED.kinematics(q).rotations.transpose(0, 2, 1) @ STANDING[..., None])[..., 0]
@@ -311,7 +313,7 @@ def test_joints_whose_velocity_is_not_theirs_are_named():
 
 @pytest.mark.parametrize(('rate', 'kind'), [(50.0, ''), (25.0, 'rate')])
 def test_a_rate_at_which_no_foothold_is_kept_is_named(rate, kind):
-    estimator = BodyEstimator(POINTED, rate=rate)
+    estimator = BodyEstimator(POINTED)
     still = np.zeros(POINTED.home.size)
     for step in range(50):
         found = estimator.update(

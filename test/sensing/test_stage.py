@@ -89,6 +89,7 @@ def test_an_imu_too_far_apart_is_not_used():
     for ms in range(0, 1000, 20):  # 50 Hz
         watched.imu(ms)
         watched.joints(ms - 8)
+        watched.stage.tick(ms * MS)
     assert watched.times == []
     assert watched.doubts == ['stamps: IMU and joints are 8 ms apart']
 

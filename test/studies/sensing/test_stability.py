@@ -27,7 +27,7 @@ def centres(log):
     joints, rates = log.joint_positions.reshape(shape), log.joint_velocities.reshape(shape)
     arms = np.array([GO2.foot_positions(q) for q in joints])
     moving = np.array(
-        [GO2.foot_jacobians(q) @ dq[..., None] for q, dq in zip(joints, rates, strict=True)]
+        [GO2.kinematics(q).jacobians @ dq[..., None] for q, dq in zip(joints, rates, strict=True)]
     )[..., 0]
     moving += cross((log.gyro @ GO2.imu[:3, :3].T)[:, None], arms)
     places = log.position[:, None] + np.einsum('nij,nlj->nli', turns, arms)
