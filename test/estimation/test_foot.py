@@ -267,15 +267,6 @@ def test_duplicate_and_late_samples_are_refused_and_change_nothing(late):
     assert estimator.update(*following) == other.update(*following)
 
 
-def test_velocities_of_others_do_not_count_with_markers():
-    estimator, other = FootEstimator(FOOT, LOAD), FootEstimator(FOOT, LOAD)
-    for step in range(50):
-        sample = (0.004 * step, (-1.0, 0.0, LOAD + 1e-3 * step), (1e-6 * step, 0.0, 0.0), 0.0)
-        estimator.update(*sample)
-        other.update(*sample, velocity=(-3.0, 1.0), variance=1e-6)
-    assert estimator.estimate == other.estimate
-
-
 def test_a_gap_longer_than_a_stance_is_a_new_stance():
     """After half a second without samples the foot is 0.16 m ahead, which is no slip."""
     stance = Stance(noise=False)
