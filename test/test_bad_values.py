@@ -37,8 +37,6 @@ CASES = (
     (sensing.BodyEstimator, ('go2',), 'robot'),
     (sensing.BodyEstimator, (ROBOT,), {'gyro_noise': 0.0}),
     (sensing.BodyEstimator, (ROBOT,), {'encoder_noise': np.nan}),
-    (sensing.BodyEstimator, (ROBOT,), {'rate': 1.0}),
-    (sensing.BodyEstimator, (ROBOT,), {'window': 2.0}),
     (sensing.BodyEstimator, (ROBOT,), {'force_axes': 'world'}),
     (sensing.Mapping.load, ('go2', 'go2'), 'robot'),
     (sample, (), {'gyro': None}),

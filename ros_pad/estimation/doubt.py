@@ -83,10 +83,7 @@ TABLE = (
 ) = range(len(TABLE))  # fmt: skip
 
 DOUBTS = tuple(dict.fromkeys(each.kind for each in TABLE))
-"""Kinds of doubt; the first one, empty, is no doubt."""
-
 SENSOR_FAULTS = tuple(dict.fromkeys(each.kind for each in TABLE if each.fault))
-"""Kinds of doubt about sensors, not about the ground."""
 
 
 def _row(code: float) -> Row:

@@ -49,7 +49,7 @@ def test_all_policies_of_a_run_begin_with_it(file, tmp_path, monkeypatch):
         found.extend(each.scales['flat_wet'] for each in given if isinstance(each, Tuning))
         raise PadError('enough')
 
-    monkeypatch.setattr(run.others, 'beside', others)
+    monkeypatch.setattr(run.other_policies, 'beside', others)
     words = ['--learnt', str(file(GOOD)), '--out', str(tmp_path / 'walk')]
     assert cli.main(['run', 'hexapod_patches', '--no-ros', *words]) != 0
     assert found == [Scale(1.2, pytest.approx(math.hypot(0.2, 0.1)))]
