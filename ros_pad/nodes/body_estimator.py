@@ -93,11 +93,17 @@ class _Samples:
         """Send what was collected, if the estimates of the feet are due at this moment."""
         if stamp_ns <= self._sent_ns < stamp_ns + SET_BACK_NS:
             return  # the moment has been sent without it
+        if any(abs(stamp_ns - each) > SET_BACK_NS for each in self._rows):
+            self._flush()  # a clock that leapt: one message has the records of one period
         self._rows[stamp_ns] = rows
         if self._pace.due(stamp_ns):
-            stamps = sorted(self._rows)
-            self._send(Block(np.array(stamps), np.array([self._rows[n] for n in stamps])))
-            self._rows, self._sent_ns = {}, stamp_ns
+            self._flush()
+            self._sent_ns = stamp_ns
+
+    def _flush(self) -> None:
+        stamps = sorted(self._rows)
+        self._send(Block(np.array(stamps), np.array([self._rows[n] for n in stamps])))
+        self._rows = {}
 
 
 class BodyEstimatorNode(PadNode):

@@ -32,6 +32,8 @@ class Joint:
         Centre of that mass in the frame of the joint, m.
     limits : tuple of float
         Lowest and highest position, rad or m; infinite without limits.
+    effort, speed : float
+        Largest torque of its motor, N m, and largest speed, rad/s; infinite if not known.
     """
 
     name: str
@@ -41,6 +43,8 @@ class Joint:
     mass: float
     centre: Array
     limits: tuple[float, float] = (-math.inf, math.inf)
+    effort: float = math.inf
+    speed: float = math.inf
 
 
 class Kinematics(NamedTuple):

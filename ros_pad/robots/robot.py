@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad import configuration
-from ros_pad.configuration import Setting, Table, number, quantity, text
+from ros_pad.configuration import Table, number, quantity, text
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import urdf
 from ros_pad.robots.chains import Chains, Joint, Kinematics
 from ros_pad.robots.gait import Gait
+from ros_pad.robots.posture import crouch, usual_gait
 from ros_pad.robots.rotation import Array, from_rpy, transform
 
 # Fewest and most legs of a robot.
@@ -37,7 +38,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Servo:
-    """A servo, the same in all joints: a spring to its set-point, up to a largest torque.
+    """A position servo, the same in all joints: a spring to its set-point.
 
     Attributes
     ----------
@@ -51,9 +52,6 @@ class Servo:
         Inertia of the motor as seen from the joint, behind its gears, kg m².
     travel : float
         Largest angle to either side of home, rad.
-    feedforward : bool
-        Whether the set-points lead by the torque that carries the robot and overcomes the damping,
-        as with torque-controlled motors; hobby servos sag instead.
     """
 
     torque: float
@@ -61,7 +59,6 @@ class Servo:
     damping: float
     rotor_inertia: float
     travel: float
-    feedforward: bool
 
     @classmethod
     def read(cls, table: Table) -> Servo:
@@ -72,7 +69,6 @@ class Servo:
             damping=table.number('damping', 'N m s/rad', 0.0, 1e5),
             rotor_inertia=table.number('rotor_inertia', 'kg m2', 1e-6, 1e3),
             travel=table.number('travel', 'rad', 0.01, 10.0, default=math.pi),
-            feedforward=table.value(Setting('feedforward', bool, ''), False),
         )
 
 
@@ -102,10 +98,13 @@ class Robot:
         Kinematics of the legs.
     home : array (legs, joints a leg)
         Joint positions in which the robot stands, rad.
-    gait : Gait or None
-        Its usual gait; None from a bare URDF file.
+    gait : Gait
+        Its usual gait.
     servo : Servo or None
-        Its servos; None from a bare URDF file.
+        Its position servos; None if its joints take torques, up to the ``effort`` and ``speed`` of
+        each :class:`~ros_pad.robots.chains.Joint`.
+    rotor_inertia : float
+        Inertia of the motors of such joints, behind their gears, kg m².
     centre : array (2,)
         Centre of mass at home, fore and left in the base, m.
     height : float
@@ -128,10 +127,11 @@ class Robot:
     height: float
     inertia: float
     leg_stiffness: float
+    gait: Gait
     foot_radius: float = 0.0
     imu: Array = field(default_factory=lambda: np.eye(4))
-    gait: Gait | None = None
     servo: Servo | None = None
+    rotor_inertia: float = 0.0
 
     @classmethod
     def load(
@@ -344,10 +344,14 @@ def _assembled(
     mass = float(weights.sum())
     centre = weights @ points / max(mass, 1e-9)
     away = points[:, :2] - centre[:2]
+    height = float(centre[2] - places.positions[:, 2].min())
+    hips = np.array([leg[0].at[:3, 3] for leg in joints])
     whole: dict[str, Any] = {
         'mass': mass,
         'centre': centre[:2].round(12),
-        'height': float(centre[2] - places.positions[:, 2].min()),
+        'height': height,
+        'gait': usual_gait(hips, height),
+        'rotor_inertia': 4e-3 * mass * height * height,  # as of a Go2
         'inertia': yaw + float(weights @ (away * away).sum(1)),
         'leg_stiffness': mass * 9.81 / 7e-3,  # it sinks by 7 mm if one leg carries all of it
     }
@@ -361,7 +365,8 @@ def _from_urdf(path: str, feet: Sequence[str], imu: str, **others: Any) -> Robot
     if not LEGS[0] <= len(set(names)) == len(names) <= LEGS[1]:
         raise InvalidInput(f'feet = {names} is not allowed: 3 to 8 different links are needed')
     file, joints, tips = urdf.read(path, names)
-    home = _posture(joints, others.pop('home', {}), path)
+    wanted = others.pop('home', {})
+    home = _posture(joints, wanted, path) if wanted else crouch(joints, tips)
     pose = file.pose(imu) if imu else np.eye(4)
     centre, yaw = file.trunk()
     ((common, count),) = Counter(joint.name for leg in joints for joint in leg).most_common(1)
@@ -405,12 +410,23 @@ def _from_table(table: Table, path: pathlib.Path) -> Robot:
     ):
         if key in table:
             others[key] = table.number(key, unit, low, high)
+    motor: dict[str, Any] = {}
     if 'servo' in table:
         with table.table('servo') as part:
-            others['servo'] = Servo.read(part)
+            if 'stiffness' in part:
+                others['servo'] = Servo.read(part)
+            else:
+                motor['effort'] = part.number('torque', 'N m', 1e-3, 1e5)
+                if 'speed' in part:
+                    motor['speed'] = part.number('speed', 'rad/s', 0.1, 1e3)
+                if 'rotor_inertia' in part:
+                    others['rotor_inertia'] = part.number('rotor_inertia', 'kg m2', 1e-6, 1e3)
     robot = _of_file(table, path, others) if 'urdf' in table else _of_links(table, path, others)
+    if motor:
+        joints = [[replace(joint, **motor) for joint in leg] for leg in robot.chains.legs]
+        robot = replace(robot, chains=Chains(joints, robot.chains.feet))
     sliding = [joint.name for leg in robot.chains.legs for joint in leg if joint.slides]
-    if robot.servo and sliding:
+    if (robot.servo or motor) and sliding:
         raise ConfigError(
             f'{table.origin}: servo is not allowed: its units are those of joints that turn, and'
             f' {sliding[0]} slides: take servo out; L2 does not simulate such a robot'

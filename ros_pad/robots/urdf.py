@@ -28,6 +28,8 @@ class _Joint(NamedTuple):
     at: Array
     axis: Array
     limits: tuple[float, float]
+    effort: float
+    speed: float
     mimics: str
 
 
@@ -117,7 +119,10 @@ class Urdf:
                 )
             mass, centre = self._carried(joint.child)
             slides = joint.kind == 'prismatic'
-            joints.append(Joint(joint.name, at, joint.axis, slides, mass, centre, joint.limits))
+            motor = joint.effort, joint.speed
+            joints.append(
+                Joint(joint.name, at, joint.axis, slides, mass, centre, joint.limits, *motor)
+            )
             at = np.eye(4)
         if not joints:
             raise self._error(f'no moving joint between {self.root!r} and foot {foot!r}')
@@ -199,6 +204,11 @@ def _joint(element: xml.Element) -> _Joint:
         number(f'joint {name!r}: lower', low, 'rad or m', -math.inf, high)
         if low < high:  # exporters write 0 and 0 where they know none
             limits = low, high
+    motor = [math.inf, math.inf]
+    for place, key in enumerate(('effort', 'velocity')):
+        # Exporters write 0 where they know none.
+        if limit is not None and (value := _number(limit, key, name)) > 0.0:
+            motor[place] = value
     return _Joint(
         name,
         kind,
@@ -207,6 +217,8 @@ def _joint(element: xml.Element) -> _Joint:
         _placed(element, name),
         line / (length or 1.0),
         limits,
+        motor[0],
+        motor[1],
         '' if mimic is None else _text(mimic, 'joint'),
     )
 

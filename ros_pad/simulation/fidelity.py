@@ -138,7 +138,7 @@ def _usual(scene: Scene) -> bool:
         return True
     body, gait = scene.legged
     usual = body.robot.gait
-    if usual is None or not gait.pushes:
+    if gait.pushes != usual.pushes:
         return False
     shifts = [a - b for a, b in zip(gait.middles, usual.phases, strict=True)]
     return all(abs(math.remainder(each - shifts[0], 1.0)) < 1e-6 for each in shifts)

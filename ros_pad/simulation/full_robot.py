@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""L2: a legged robot with servos in its joints, in MuJoCo.
+"""L2: a legged robot in MuJoCo.
 
-Body and legs are rigid. Servos with the torque and speed of real ones drive the joints.
+Body and legs are rigid. Position servos drive the joints along the gait, or torques keep a gait
+with balance; both within what real motors can do.
 Landing, scuffing and slip of the feet follow from contact. Before every step of MuJoCo the
 friction of each foot is set from the same film and the same law of resistance as on the other
 fidelity levels.
@@ -23,8 +24,16 @@ from ros_pad.configuration import number
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots.rotation import Array
 from ros_pad.signals import children_spared
+from ros_pad.simulation.balance import Balance
 from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings, mjcf, tow_step
-from ros_pad.simulation.robot import FootState, Proprioception, Vector, check_reach
+from ros_pad.simulation.robot import (
+    FootState,
+    Proprioception,
+    Vector,
+    check_reach,
+    check_strength,
+    check_tow,
+)
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.servos import Servos
 from ros_pad.simulation.soles import Sled, Soles
@@ -102,11 +111,6 @@ class FullRobot:
         body, _ = scene.legged
         robot = body.robot
         number('period', period, 's', above=True)
-        if robot.servo is None:
-            raise ConfigError(
-                f'{scene.source}: fidelity L2 needs servos: the file of {scene.robot} has no'
-                ' key servo; add it, or walk with --fidelity L1'
-            )
         solver = check_reach(scene)
         self.legs = scene.legs
         self.joint_names = robot.joint_names
@@ -123,7 +127,13 @@ class FullRobot:
         self._state = self.data.qpos[: 7 + len(self.joint_names)]
         self._where: Any = memoryview(self._state)  # faster for single numbers
         self._mujoco = mujoco
-        self._servos = Servos(scene, solver, period, self.data.ctrl)
+        self._drive: Servos | Balance
+        if robot.servo:
+            self._drive = Servos(scene, solver, period, self.data.ctrl)
+        else:
+            check_strength(scene)
+            check_tow(scene)
+            self._drive = Balance(scene, period, mujoco, self.model, self.data)
         self.soles = Soles(scene, floor, period, dt, self.model, self.data)
         self._sled = Sled(scene.tow, floor, self.model, self.data) if scene.tow.weight else None
         self._senses = _Senses(mujoco, self.model, self.data, scene, period)
@@ -162,12 +172,13 @@ class FullRobot:
     def _place(self, height: float) -> None:
         """Place the robot at rest on its planned feet, and the load behind it."""
         data = self.data
-        self._state[7:] = self._servos.targets
-        data.qpos[2] = height + self.soles.place(self._servos.path.feet)
+        self._state[7:] = self._drive.targets
+        data.qpos[2] = height + self.soles.place(self._drive.places)
         if self._sled:
             data.qpos[len(self._state)] = -self._sled.distance
         self._mujoco.mj_kinematics(self.model, data)
         self.soles.update()
+        self._drive.place()
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
@@ -201,17 +212,15 @@ class FullRobot:
         self._judge()
 
     def _aim(self) -> None:
-        """Set the set-points of all servos; where a foot is out of reach, they stay unchanged."""
-        servos = self._servos
-        swung = servos.path.swings
-        servos.walk(self.time, self.body[2])
-        if servos.path.swings != swung:
-            for index in self.soles.swing(swung, servos.path.swings):
-                self._end(f'leg {index + 1} does not clear the ground in its swing')
+        """Set the set-points of all joints; where a foot is out of reach, they stay unchanged."""
+        drive, swung = self._drive, self._drive.swings
         try:
-            servos.aim()
+            drive.act(self.time, self.body[2])
         except InvalidInput as error:
             self._end(str(error))
+        if drive.swings != swung:
+            for index in self.soles.swing(swung, drive.swings):
+                self._end(f'leg {index + 1} does not clear the ground in its swing')
 
     def _judge(self) -> None:
         """Set the verdict when the body tips over or a joint is far from its set-point."""
@@ -219,7 +228,7 @@ class FullRobot:
         upright = 1.0 - 2.0 * (state[4] * state[4] + state[5] * state[5])
         if upright < math.cos(TIPPED):
             self._end(f'tip-over: the body leans {math.acos(max(-1.0, upright)):.2f} rad')
-        elif lost := self._servos.lost(state[7:]):
+        elif lost := self._drive.lost(state[7:]):
             self._end(lost)
 
     def _end(self, why: str) -> None:

@@ -88,7 +88,7 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
     Parameters
     ----------
     scene : Scene
-        A scene with a legged robot that has servos.
+        A scene with a legged robot.
     uneven : bool
         Whether the ground below each foot can move up and down.
     settings : SolverSettings
@@ -102,8 +102,7 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
         When the legs alone have more inertia than the scene's body.
     """
     (body, _), tow, slope = scene.legged, scene.tow, scene.floor.slope
-    assert body.robot.servo is not None
-    robot, servo = body.robot, body.robot.servo
+    robot = body.robot
     grounds, trees, pairs, sensors = [], [], [], []
     for leg in scene.legs:
         ground = f'<geom name="block_{leg}" type="plane" size="0 0 1"/>'
@@ -114,7 +113,7 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
             f'<pair name="foot_{leg}" geom1="block_{leg}" geom2="foot_{leg}" condim="4"/>'
         )
         sensors.append(f'<contact geom1="block_{leg}" geom2="foot_{leg}" data="force torque"/>')
-    servos = [f'<position joint="{escape(name)}"/>' for name in robot.joint_names]
+    defaults, motors = _drive_xml(robot)
     load = line = ''
     if tow.weight:
         grounds.append('<geom name="ground" type="plane" size="0 0 1"/>')
@@ -130,8 +129,7 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
   </option>
   <default>
     <geom contype="0" conaffinity="0"/>
-    <joint damping="{servo.damping!r}" armature="{servo.rotor_inertia!r}"/>
-    <position kp="{servo.stiffness!r}" forcerange="{-servo.torque!r} {servo.torque!r}"/>
+    {defaults}
   </default>
   <worldbody>
     {''.join(grounds)}
@@ -145,10 +143,26 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
   </worldbody>
   <contact>{''.join(pairs)}</contact>
   {line}
-  <actuator>{''.join(servos)}</actuator>
+  <actuator>{motors}</actuator>
   <sensor>{''.join(sensors)}</sensor>
 </mujoco>
 """
+
+
+def _drive_xml(robot: Robot) -> tuple[str, str]:
+    """Return what joints and motors of a robot have in common, and its motors, in XML."""
+    servo = robot.servo
+    if servo:
+        return (
+            f'<joint damping="{servo.damping!r}" armature="{servo.rotor_inertia!r}"/><position'
+            f' kp="{servo.stiffness!r}" forcerange="{-servo.torque!r} {servo.torque!r}"/>',
+            ''.join(f'<position joint="{escape(name)}"/>' for name in robot.joint_names),
+        )
+    motors = ''
+    for joint in (each for leg in robot.chains.legs for each in leg):
+        most = min(joint.effort, 1e9)
+        motors += f'<motor joint="{escape(joint.name)}" forcerange="{-most!r} {most!r}"/>'
+    return f'<joint armature="{robot.rotor_inertia!r}"/>', motors
 
 
 def _trunk_inertial(scene: Scene) -> str:

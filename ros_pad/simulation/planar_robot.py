@@ -88,7 +88,7 @@ class PlanarRobot:
         number('period', period, 's', above=True)
         check_reach(scene)
         if compile_steps is None:
-            compile_steps = compiled.worth_loading(scene.duration / period)
+            compile_steps = compiled.worth_loading(planar_step, scene.duration / period)
         self.legs = scene.legs
         self.period = period
         self.time = 0.0
@@ -121,7 +121,9 @@ class PlanarRobot:
             foot=model.foot._replace(limits=np.array(model.foot.limits)),
             floor=floor._replace(wet=np.array(floor.wet), heights=np.array(floor.heights)),
         )
-        self._step = compiled.step(self.model, self.state, self.table, (0.0,) * len(self.legs))
+        self._step = compiled.step(
+            planar_step, self.model, self.state, self.table, (0.0,) * len(self.legs)
+        )
 
     @property
     def body(self) -> Vector:

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
@@ -169,6 +170,43 @@ def check_reach(scene: Scene) -> FeetSolver:
                 f' {unit} is within reach of the legs of {body.robot.source} from its home: {why}'
             )
     return FeetSolver(body.robot)
+
+
+def check_strength(scene: Scene) -> None:
+    """Raise `ConfigError` if the fewest legs that stand at once cannot carry the robot."""
+    body, gait = scene.legged
+    robot = body.robot
+    if sliding := [each.name for leg in robot.chains.legs for each in leg if each.slides]:
+        raise ConfigError(
+            f'{scene.source}: fidelity L2 is not for robots with joints that slide, as'
+            f' {sliding[0]} of {scene.robot}: walk with --fidelity L1'
+        )
+    share = body.mass * GRAVITY / gait.fewest
+    needed = share * np.abs(robot.kinematics(robot.home).jacobians[:, 2])
+    for leg, torques in zip(robot.chains.legs, needed.tolist(), strict=True):
+        for joint, torque in zip(leg, torques, strict=True):
+            if torque > joint.effort:
+                raise ConfigError(
+                    f'{scene.source}: {joint.name} has {joint.effort:g} N m: at least'
+                    f' {torque:.3g} N m is needed to stand on {gait.fewest} legs with'
+                    f' {body.mass:g} kg; or let more legs stand (gait.duty)'
+                )
+
+
+def check_tow(scene: Scene) -> None:
+    """Raise `ConfigError` if tow and slope need more than the grip of all feet on dry ground."""
+    (body, gait), tow, slope = scene.legged, scene.tow, scene.floor.slope
+    legs, weight = len(gait.middles), body.mass * GRAVITY
+    foot = scene.foot.on_rough(scene.floor.roughness)
+    grip = legs * foot.grip(weight * math.cos(slope) / legs, 0.0)
+    uphill = weight * math.sin(slope)
+    each = tow.friction_dry * math.cos(slope) + math.sin(slope)  # N for each N of the tow
+    if uphill + tow.weight * each > grip:
+        raise ConfigError(
+            f'{scene.source}: tow.weight = {tow.weight:g} N is not allowed: at most'
+            f' {max(0.0, (grip - uphill) / max(each, 1e-9)):.3g} N can be pulled by all feet on'
+            f' dry ground, at a slope of {slope:g} rad'
+        )
 
 
 def _miss(scene: Scene, lift: float, stride: float, heading_gain: float) -> str:

@@ -19,6 +19,7 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Gait, Robot
+from ros_pad.robots.posture import FROUDE
 from ros_pad.simulation.faults import AIR_KINDS, Fault, listed
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.terrain import FLOORS, Floor, patch_lengths
@@ -540,7 +541,7 @@ def _part(table: Table, key: str, read: Callable[[Table], Any]) -> Any:
 def _named(table: Table, key: str, load: Callable[[str], Any]) -> Any:
     """Load what a scene names; a path is relative to the folder of the scene's file."""
     name = table.text(key)
-    if name.endswith(('.yaml', '.yml')):
+    if name.endswith(('.yaml', '.yml', '.urdf')):
         name = os.fspath(pathlib.Path(table.origin).parent / name)
     try:
         return load(name)
@@ -555,12 +556,8 @@ def foot_of(table: Table) -> Foot:
 
 
 def _robot_of(table: Table) -> Robot:
-    robot: Robot = _named(table, 'robot', lambda name: Robot.load(name, foot_radius=0.0))
-    if robot.gait is None:
-        raise ConfigError(
-            f'{table.origin}: robot = {table.text("robot")!r}: a walk needs a YAML file with feet,'
-            ' posture, gait and servos, see docs/robots.md'
-        )
+    feet = table.sequence('feet') if 'feet' in table else ()
+    robot: Robot = _named(table, 'robot', lambda name: Robot.load(name, feet, foot_radius=0.0))
     return robot
 
 
@@ -569,7 +566,7 @@ def _walking_gait(table: Table, robot: Robot) -> WalkingGait:
     steps = Gait.read(table, robot.hips, robot.gait)
     gait = WalkingGait(
         cycle=steps.cycle,
-        stride=table.number('stride', 'm', 1e-3, 2.0),
+        stride=table.number('stride', 'm', 1e-3, 2.0, default=_usual_stride(robot, steps)),
         duty=steps.duty,
         lift=steps.lift,
         middles=tuple((0.25 + phase) % 1.0 for phase in steps.phases),
@@ -581,6 +578,11 @@ def _walking_gait(table: Table, robot: Robot) -> WalkingGait:
     start = 0.5 * (gait.duty - gait.overlap)
     middles = tuple((start + phase) % 1.0 for phase in steps.phases)
     return dataclasses.replace(gait, middles=middles)
+
+
+def _usual_stride(robot: Robot, gait: Gait) -> float:
+    """Return the stride of a slow walk, m, that of a small Froude number."""
+    return round(math.sqrt(FROUDE * GRAVITY * robot.height) * gait.cycle, 4)
 
 
 def _air_line(table: Table) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
-from ros_pad.simulation.gait import FootPath
+from ros_pad.simulation.gait import FootPath, Place
 from ros_pad.simulation.scene import Scene
 
 LOST = 0.3
@@ -33,8 +33,6 @@ class Servos:
 
     Attributes
     ----------
-    path : FootPath
-        Where the gait brings the feet.
     targets : list of float
         Joint positions for these places, rad.
     """
@@ -48,38 +46,37 @@ class Servos:
         self._settle = scene.settle
         self._gain = scene.heading_gain
         self._weight = body.mass * GRAVITY
-        self.path = FootPath(gait, [(x, y, body.ground) for x, y in body.homes])
-        self.targets = solver.angles([(x, y, body.ground) for x, y, _ in self.path.feet])
+        self._path = FootPath(gait, [(x, y, body.ground) for x, y in body.homes])
+        self.targets = solver.angles([(x, y, body.ground) for x, y, _ in self._path.feet])
         self._setpoints = setpoints
         setpoints[:] = self.targets
 
-    def walk(self, time: float, heading: float) -> None:
-        """Move the feet to a time, s, with a heading of the body, rad."""
-        # The clock of the gait starts when the robot has settled.
-        turn = -self._gain * heading * self._period
-        self.path.move(max(0.0, time - self._settle), turn)
+    @property
+    def places(self) -> list[Place]:
+        """Where the gait brings the feet, fore, left and up in the body, m."""
+        return self._path.feet
 
-    def aim(self) -> None:
-        """Set all set-points for the places of the feet.
+    @property
+    def swings(self) -> list[bool]:
+        """Whether each of them swings."""
+        return self._path.swings
+
+    def place(self) -> None:
+        """Do nothing: set-points need no forces."""
+
+    def act(self, time: float, heading: float) -> None:
+        """Set all set-points for a time, s, with a heading of the body, rad.
 
         Raises
         ------
         InvalidInput
             When a foot is out of reach; the set-points stay unchanged.
         """
-        before, self.targets = self.targets, self._solver.angles(self.path.feet)
-        self._setpoints[:] = self._led(before) if self._servo.feedforward else self.targets
-
-    def _led(self, before: Sequence[float]) -> Array:
-        """Return set-points that lead by what carries the robot and overcomes the damping."""
-        robot, servo = self._robot, self._servo
-        stands = [not swings for swings in self.path.swings]
-        aim = np.array(self.targets)
-        share = np.array(stands) * self._weight / max(sum(stands), 1)
-        jacobians = robot.chains.solve(aim.reshape(robot.home.shape)).jacobians
-        torque = -share[:, None] * jacobians[:, 2]
-        speed = (aim - before) / self._period
-        return np.asarray(aim + (torque.ravel() + servo.damping * speed) / servo.stiffness)
+        # The clock of the gait starts when the robot has settled.
+        turn = -self._gain * heading * self._period
+        self._path.move(max(0.0, time - self._settle), turn)
+        self.targets = self._solver.angles(self._path.feet)
+        self._setpoints[:] = self.targets
 
     def lost(self, joints: Sequence[float]) -> str:
         """Return which of the joints, rad, is far from its set-point, or an empty text."""

@@ -38,8 +38,8 @@ WALKS = {
     },
     'go2': {
         'body.mass': (12.0, 18.0),
-        'gait.cycle': (0.6, 1.2),
-        'gait.stride': (0.06, 0.14),
+        'gait.cycle': (0.45, 1.0),
+        'gait.stride': (0.06, 0.2),
         'gait.duty': (0.58, 0.7),
         'gait.lift': (0.04, 0.07),
         'tow.weight': (0.0, 80.0),

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.robots import Chains, Robot, urdf
+from ros_pad.robots import Chains, Gait, Robot, urdf
 from ros_pad.robots.rotation import Array, from_rpy, matrix
 from studies.sensing.walks import Noise
 
@@ -132,7 +132,7 @@ def two_legs(path: pathlib.Path) -> Robot:
         imu=file.pose('root_link_imu_frame'),
         chains=Chains(legs, feet),
         home=np.zeros((2, len(_LEG))),
-        gait=None,
+        gait=Gait(1.0, 0.6, (0.0, 0.5), 0.05),
         servo=None,
         centre=np.zeros(2),
         height=0.6,

@@ -199,4 +199,4 @@ def test_compiled_tip_over_and_refusals_are_the_same():
 def test_without_numba_an_extra_is_named(monkeypatch):
     monkeypatch.setitem(__import__('sys').modules, 'numba', None)
     with pytest.raises(ConfigError, match=r'pip install "ros_pad\[fast\]"'):
-        compiled.dispatcher.__wrapped__()
+        compiled.dispatcher.__wrapped__(planar_step)

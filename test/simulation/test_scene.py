@@ -93,7 +93,7 @@ BAD = [
     (HEXAPOD, 'dome_pressure', 95e3, 'dome_pressure = 95000.0 is not allowed: a number from 1'),
     (HEXAPOD, 'body', {'mass': '2 kg'}, "body: mass = '2 kg' is not allowed: a number from 0.05"),
     (HEXAPOD, 'gait.duty', 0.5, 'gait: pushes = True is not allowed: two groups of legs'),
-    (HEXAPOD, 'gait.stride', ..., "gait: key 'stride' is missing"),
+    (HEXAPOD, 'gait.stride', 3.0, 'gait: stride = 3.0 is not allowed: a number from 0.001 to 2'),
     (HEXAPOD, 'floor.patch_length', 6.0, 'floor: patch_length = 6.0 is not allowed: a number'),
     (HEXAPOD, 'floor.drawing', '#', "floor: unknown key 'drawing'"),
     (HEXAPOD, 'tow.friction_dry', ..., "tow: key 'friction_dry' is missing"),
