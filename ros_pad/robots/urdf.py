@@ -207,8 +207,9 @@ def _joint(element: xml.Element) -> _Joint:
     motor = [math.inf, math.inf]
     for place, key in enumerate(('effort', 'velocity')):
         # Exporters write 0 where they know none.
-        if limit is not None and (value := _number(limit, key, name)) > 0.0:
-            motor[place] = value
+        if limit is not None and (value := _number(limit, key, name)):
+            unit = ('N m', 'rad/s')[place]
+            motor[place] = number(f'joint {name!r}: {key}', value, unit, 0.0)
     return _Joint(
         name,
         kind,

@@ -34,7 +34,6 @@ def plan(scene: Scene, period: float) -> Plan:
         speeds=np.array([joint.speed for leg in body.robot.chains.legs for joint in leg]),
         height=-body.ground,
         mass=body.mass,
-        light=0.01 * body.mass * GRAVITY,
         friction=0.6,
         rise=2.0 * pendulum,
         drift=0.5 * pendulum,

@@ -24,6 +24,7 @@ AHEAD = 0.8  # share of a swing after which its end stays: a foot that still mov
 TOP = 0.4  # share of a swing at which the foot is highest
 TRUST = 0.8  # share of the friction of a slip that the next force may use
 LEAST_GRIP = 0.02  # friction below which no foot is taken to be
+LOADED = 0.01  # share of the weight from which a foot stands
 UNLOADED = 0.02  # s without load after which a standing foot has lost the ground
 DAMPING = 0.01  # weight of forces that do not move the body; in 1/mass
 STIFFNESS = 0.3  # of the forces to their cones, over the mean of the problem's
@@ -31,7 +32,7 @@ ROUNDS = 20  # between least squares and cones
 GRAVITY = 9.81
 
 # Rows of the table of feet; a column is a foot. Places are in the world.
-FEET = 20
+FEET = 19
 (
     STANDS,  # 1 while the foot carries
     PHASE,  # time since the touch-down of the gait, as a share of the cycle
@@ -42,7 +43,6 @@ FEET = 20
     AIM_X, AIM_Y, AIM_Z,  # where the swinging foot should be, m
     RATE_X, RATE_Y, RATE_Z,  # its velocity there, m/s
     PULL_X, PULL_Y, PULL_Z,  # and its acceleration, m/s2
-    ABOVE,  # height of the aim in the last step, m
     FORCE,  # first of three: the force of the ground, N
 ) = range(FEET)  # fmt: skip
 ROWS = FEET + 2
@@ -72,7 +72,6 @@ class Plan(NamedTuple):
     speeds: Any  # largest of each joint, rad/s
     height: float  # of the base above the ground, m
     mass: float  # kg
-    light: float  # load, N, from which a foot stands
     friction: float  # coefficient that a foot is taken to have before it slips
     rise: float  # frequency of the height
     drift: float  # of the place
@@ -140,7 +139,7 @@ def step(
     for leg in range(legs):
         of_foot(plan, leg, q, v, turn, places, jacobians, speed)
         load = contacts[leg][0]
-        find_ground(plan, leg, goal, feet, load > plan.light, places[leg])
+        find_ground(plan, leg, goal, feet, load > LOADED * plan.mass * GRAVITY, places[leg])
         find_grip(plan, leg, feet, speed, contacts[leg])
         if feet[STANDS][leg] < 0.5:
             aim(plan, leg, goal, feet, q, v, turn)
@@ -210,7 +209,7 @@ def find_grip(plan: Plan, leg: int, feet: Any, speed: Floats, contact: Floats) -
     grip = feet[GRIP][leg]
     grip += plan.period / plan.forgetting * (plan.friction - grip)
     slips = speed[0] * speed[0] + speed[1] * speed[1] > plan.slip * plan.slip
-    if slips and feet[STANDS][leg] > 0.5 and contact[0] > plan.light:
+    if slips and feet[STANDS][leg] > 0.5 and contact[0] > LOADED * plan.mass * GRAVITY:
         side = sqrt(contact[1] * contact[1] + contact[2] * contact[2])
         grip = max(LEAST_GRIP, min(grip, TRUST * side / contact[0]))
     feet[GRIP][leg] = grip

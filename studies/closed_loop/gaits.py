@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walk quadrupeds that nobody tuned: distance, slip and falls on floors, with pushes, on slopes.
+"""Walk quadrupeds from their URDF files alone: distance, slip and falls on several floors.
 
 Each robot walks its usual gait at its usual speed, from a scene that names its URDF file and feet
 alone. Prints a table, and writes it to gaits.json. FILE is YAML: for each robot, by name, the

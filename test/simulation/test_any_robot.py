@@ -255,3 +255,14 @@ def test_what_cannot_walk_is_refused_with_the_number_that_would(tmp_path, robot,
     path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | scene))
     with pytest.raises(ConfigError, match=message):
         walk(Scene.load(path), 'L2')
+
+
+def test_a_negative_effort_is_refused(tmp_path):
+    path = urdf_scene(tmp_path)
+    text = (tmp_path / 'q.urdf').read_text()
+    limit = '<limit lower="-1" upper="1" effort="-5" velocity="1"/>'
+    (tmp_path / 'q.urdf').write_text(
+        re.sub('(_thigh_joint" type="revolute">)', rf'\1{limit}', text)
+    )
+    with pytest.raises(ConfigError, match=r'effort = -5\.0 is not allowed: .* N m'):
+        Scene.load(path)
