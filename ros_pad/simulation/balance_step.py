@@ -248,13 +248,16 @@ def aim(plan: Plan, leg: int, goal: Any, feet: Any, q: Floats, v: Floats, turn: 
         feet[AIM_X + axis][leg] = start + there * way
         feet[RATE_X + axis][leg] = rate * way
         feet[PULL_X + axis][leg] = pull * way
+    # A foot rises above the higher of its two grounds.
+    top = plan.lift + max(goal[GROUND], feet[FROM_Z][leg])
     if share < TOP:
-        start, way = feet[FROM_Z][leg], plan.lift + goal[GROUND] - feet[FROM_Z][leg]
+        start = feet[FROM_Z][leg]
         there, rate, pull = blend(share / TOP, TOP * time)
     else:
-        start, way = goal[GROUND], plan.lift
+        start = goal[GROUND]
         there, rate, pull = blend((1.0 - share) / (1.0 - TOP), (1.0 - TOP) * time)
         rate = -rate
+    way = top - start
     feet[AIM_Z][leg] = start + there * way
     feet[RATE_Z][leg] = rate * way
     feet[PULL_Z][leg] = pull * way
