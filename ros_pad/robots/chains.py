@@ -32,8 +32,10 @@ class Joint:
         Centre of that mass in the frame of the joint, m.
     limits : tuple of float
         Lowest and highest position, rad or m; infinite without limits.
-    effort, speed : float
+    torque, speed : float
         Largest torque of its motor, N m, and largest speed, rad/s; infinite if not known.
+    rotor_inertia : float
+        Inertia of the motor as seen from the joint, behind its gears, kg m²; 0 if not known.
     """
 
     name: str
@@ -43,8 +45,9 @@ class Joint:
     mass: float
     centre: Array
     limits: tuple[float, float] = (-math.inf, math.inf)
-    effort: float = math.inf
+    torque: float = math.inf
     speed: float = math.inf
+    rotor_inertia: float = 0.0
 
 
 class Kinematics(NamedTuple):

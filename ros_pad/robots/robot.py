@@ -34,6 +34,11 @@ HEAVIEST = 2000.0
 
 _METRES, _KILOGRAMS = 'm (not mm)', 'kg (not g)'  # of a file in other units, values are refused
 _ORIGIN = (0.0, 0.0, 0.0)
+_MOTOR = (
+    ('torque', 'N m', 1e-3, 1e5),
+    ('speed', 'rad/s', 0.1, 1e3),
+    ('rotor_inertia', 'kg m2', 1e-6, 1e3),
+)
 
 
 @dataclass(frozen=True)
@@ -42,32 +47,24 @@ class Servo:
 
     Attributes
     ----------
-    torque : float
-        Largest torque, N m.
     stiffness : float
         Torque for each angle to the set-point, N m/rad.
     damping : float
         Torque against the speed of the joint, N m s/rad.
-    rotor_inertia : float
-        Inertia of the motor as seen from the joint, behind its gears, kg m².
     travel : float
         Largest angle to either side of home, rad.
     """
 
-    torque: float
     stiffness: float
     damping: float
-    rotor_inertia: float
     travel: float
 
     @classmethod
     def read(cls, table: Table) -> Servo:
         """Read the table ``servo`` of a robot's file."""
         return cls(
-            torque=table.number('torque', 'N m', 1e-3, 1e5),
             stiffness=table.number('stiffness', 'N m/rad', 1e-2, 1e6),
             damping=table.number('damping', 'N m s/rad', 0.0, 1e5),
-            rotor_inertia=table.number('rotor_inertia', 'kg m2', 1e-6, 1e3),
             travel=table.number('travel', 'rad', 0.01, 10.0, default=math.pi),
         )
 
@@ -101,10 +98,7 @@ class Robot:
     gait : Gait
         Its usual gait.
     servo : Servo or None
-        Its position servos; None if its joints take torques, up to the ``effort`` and ``speed`` of
-        each :class:`~ros_pad.robots.chains.Joint`.
-    rotor_inertia : float
-        Inertia of the motors of such joints, behind their gears, kg m².
+        Its position servos; None if its joints take torques.
     centre : array (2,)
         Centre of mass at home, fore and left in the base, m.
     height : float
@@ -131,7 +125,6 @@ class Robot:
     foot_radius: float = 0.0
     imu: Array = field(default_factory=lambda: np.eye(4))
     servo: Servo | None = None
-    rotor_inertia: float = 0.0
 
     @classmethod
     def load(
@@ -351,7 +344,6 @@ def _assembled(
         'centre': centre[:2].round(12),
         'height': height,
         'gait': usual_gait(hips, height),
-        'rotor_inertia': 4e-3 * mass * height * height,  # as of a Go2
         'inertia': yaw + float(weights @ (away * away).sum(1)),
         'leg_stiffness': mass * 9.81 / 7e-3,  # it sinks by 7 mm if one leg carries all of it
     }
@@ -413,20 +405,17 @@ def _from_table(table: Table, path: pathlib.Path) -> Robot:
     motor: dict[str, Any] = {}
     if 'servo' in table:
         with table.table('servo') as part:
+            for key, unit, low, high in _MOTOR:
+                if key in part:
+                    motor[key] = part.number(key, unit, low, high)
             if 'stiffness' in part:
                 others['servo'] = Servo.read(part)
-            else:
-                motor['effort'] = part.number('torque', 'N m', 1e-3, 1e5)
-                if 'speed' in part:
-                    motor['speed'] = part.number('speed', 'rad/s', 0.1, 1e3)
-                if 'rotor_inertia' in part:
-                    others['rotor_inertia'] = part.number('rotor_inertia', 'kg m2', 1e-6, 1e3)
     robot = _of_file(table, path, others) if 'urdf' in table else _of_links(table, path, others)
     if motor:
         joints = [[replace(joint, **motor) for joint in leg] for leg in robot.chains.legs]
         robot = replace(robot, chains=Chains(joints, robot.chains.feet))
     sliding = [joint.name for leg in robot.chains.legs for joint in leg if joint.slides]
-    if (robot.servo or motor) and sliding:
+    if motor and sliding:
         raise ConfigError(
             f'{table.origin}: servo is not allowed: its units are those of joints that turn, and'
             f' {sliding[0]} slides: take servo out; L2 does not simulate such a robot'

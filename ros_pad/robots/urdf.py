@@ -28,8 +28,7 @@ class _Joint(NamedTuple):
     at: Array
     axis: Array
     limits: tuple[float, float]
-    effort: float
-    speed: float
+    motor: list[float]  # largest torque and speed
     mimics: str
 
 
@@ -119,9 +118,8 @@ class Urdf:
                 )
             mass, centre = self._carried(joint.child)
             slides = joint.kind == 'prismatic'
-            motor = joint.effort, joint.speed
             joints.append(
-                Joint(joint.name, at, joint.axis, slides, mass, centre, joint.limits, *motor)
+                Joint(joint.name, at, joint.axis, slides, mass, centre, joint.limits, *joint.motor)
             )
             at = np.eye(4)
         if not joints:
@@ -204,12 +202,11 @@ def _joint(element: xml.Element) -> _Joint:
         number(f'joint {name!r}: lower', low, 'rad or m', -math.inf, high)
         if low < high:  # exporters write 0 and 0 where they know none
             limits = low, high
-    motor = [math.inf, math.inf]
-    for place, key in enumerate(('effort', 'velocity')):
+    motor = []
+    for key, unit in (('effort', 'N m'), ('velocity', 'rad/s')):
+        value = 0.0 if limit is None else _number(limit, key, name)
         # Exporters write 0 where they know none.
-        if limit is not None and (value := _number(limit, key, name)):
-            unit = ('N m', 'rad/s')[place]
-            motor[place] = number(f'joint {name!r}: {key}', value, unit, 0.0)
+        motor.append(number(f'joint {name!r}: {key}', value, unit, 0.0) or math.inf)
     return _Joint(
         name,
         kind,
@@ -218,8 +215,7 @@ def _joint(element: xml.Element) -> _Joint:
         _placed(element, name),
         line / (length or 1.0),
         limits,
-        motor[0],
-        motor[1],
+        motor,
         '' if mimic is None else _text(mimic, 'joint'),
     )
 

@@ -293,7 +293,9 @@ def swing(
     damping = 1e-4 * (square[0] + square[4] + square[8])
     for axis in range(3):
         square[4 * axis] += damping
-    solve(square, 3, pull)
+    factorise(square, 3)
+    forward(square, 3, pull, 0)
+    backward(square, 3, pull)
     for i in range(leg * plan.joints, (leg + 1) * plan.joints):
         total = 0.0
         for axis in range(3):
@@ -346,19 +348,16 @@ def stand_round(plan: Plan, goal: Any, turn: Floats, wrench: Floats, places: Any
 
 
 def share_out(
-    plan: Plan, feet: Any, q: Floats, turn: Floats, mass: Any, wrench: Floats, places: Any
+    plan: Plan, feet: Any, q: Floats, turn: Floats, mass: Any, wrench: Any, places: Any
 ) -> None:
-    """Set the forces of the standing feet, N, whose wrench is nearest to the needed one."""
+    """Set the forces of the standing feet, N, whose wrench is nearest; the wrench is used up."""
     legs = plan.legs
     low = [0.0] * 36  # Cholesky factor of the body's inertia
     for i in range(6):
         for j in range(i + 1):
             low[6 * i + j] = mass[i][j]
-    factorise(low)
-    goal = [0.0] * 6
-    for i in range(6):
-        goal[i] = wrench[i]
-    forward(low, goal, 0)
+    factorise(low, 6)
+    forward(low, 6, wrench, 0)
     columns = [0.0] * (18 * legs)  # acceleration, in the norm of inertia, of each unit force
     trace = 0.0
     for leg in range(legs):
@@ -374,39 +373,35 @@ def share_out(
                         + turn[3 + i] * arms[3 * axis + 1]
                         + turn[6 + i] * arms[3 * axis + 2]
                     )
-                forward(low, columns, at)
+                forward(low, 6, columns, at)
                 for i in range(6):
                     trace += columns[at + i] * columns[at + i]
-    force, push = [0.0] * (3 * legs), [0.0] * (3 * legs)
+    push = [0.0] * (3 * legs)
     for i in range(3 * legs):
         for k in range(6):
-            push[i] += columns[6 * i + k] * goal[k]
-    damping = DAMPING / plan.mass
-    factor = [0.0] * 36
-    least_squares(columns, damping, push, factor, force, True)
-    free = True
-    for leg in range(legs):
-        free = in_cone(force, 3 * leg, feet[GRIP][leg]) and free
-    if not free:
-        into_cones(plan, feet, columns, damping, trace / (3.0 * legs), push, force)
+            push[i] += columns[6 * i + k] * wrench[k]
+    force = [0.0] * (3 * legs)
+    fit(plan, feet, columns, trace / (3.0 * legs), push, force)
     for leg in range(legs):
         for axis in range(3):
             stands = feet[STANDS][leg] > 0.5
             feet[FORCE + axis][leg] = force[3 * leg + axis] if stands else 0.0
 
 
-def into_cones(
-    plan: Plan, feet: Any, columns: Floats, damping: float, mean: float, push: Floats, force: Any
-) -> None:
+def fit(plan: Plan, feet: Any, columns: Floats, mean: float, push: Floats, force: Any) -> None:
     """Find the forces within the cones of friction, by alternating directions."""
-    size, stiff = 3 * plan.legs, STIFFNESS * mean
+    size, damping, stiff = 3 * plan.legs, DAMPING / plan.mass, STIFFNESS * mean
     factor = [0.0] * 36
     debt, near, pull = [0.0] * size, [0.0] * size, [0.0] * size
+    least_squares(columns, damping, push, factor, force, True)
     for rounds in range(ROUNDS):
+        free = rounds == 0
         for i in range(size):
             near[i] = force[i] + debt[i]
         for leg in range(plan.legs):
-            onto_cone(near, 3 * leg, feet[GRIP][leg])
+            free = onto_cone(near, 3 * leg, feet[GRIP][leg]) and free
+        if free:
+            return
         for i in range(size):
             debt[i] += force[i] - near[i]
             pull[i] = push[i] + stiff * (near[i] - debt[i])
@@ -415,23 +410,16 @@ def into_cones(
         force[i] = near[i]
 
 
-def in_cone(force: Floats, at: int, friction: float) -> bool:
-    """Return whether a force is within its cone of friction."""
-    x, y, z = force[at], force[at + 1], force[at + 2]
-    return z >= 0.0 and x * x + y * y <= friction * friction * z * z
-
-
-def onto_cone(force: Any, at: int, friction: float) -> None:
-    """Move a force to the nearest one in its cone of friction."""
+def onto_cone(force: Any, at: int, friction: float) -> bool:
+    """Move a force to the nearest one in its cone of friction; return whether it was there."""
     x, y, z = force[at], force[at + 1], force[at + 2]
     side = sqrt(x * x + y * y)
-    if side > friction * z:
-        up = max(0.0, (friction * side + z) / (1.0 + friction * friction))
-        force[at], force[at + 1], force[at + 2] = (
-            x * friction * up / side if side > 0.0 else 0.0,
-            y * friction * up / side if side > 0.0 else 0.0,
-            up,
-        )
+    if side <= friction * z:
+        return True
+    up = max(0.0, (friction * side + z) / (1.0 + friction * friction))
+    share = friction * up / side if side > 0.0 else 0.0
+    force[at], force[at + 1], force[at + 2] = share * x, share * y, up
+    return False
 
 
 def least_squares(
@@ -446,16 +434,13 @@ def least_squares(
                 for k in range(size):
                     total += columns[6 * k + i] * columns[6 * k + j]
                 factor[6 * i + j] = total
-        factorise(factor)
+        factorise(factor, 6)
     part = [0.0] * 6
     for k in range(size):
         for i in range(6):
             part[i] += columns[6 * k + i] * push[k]
-    forward(factor, part, 0)
-    for i in range(5, -1, -1):
-        for k in range(i + 1, 6):
-            part[i] -= factor[6 * k + i] * part[k]
-        part[i] /= factor[7 * i]
+    forward(factor, 6, part, 0)
+    backward(factor, 6, part)
     for k in range(size):
         total = push[k]
         for i in range(6):
@@ -463,34 +448,27 @@ def least_squares(
         force[k] = total / weight
 
 
-def factorise(matrix: Any) -> None:
-    """Replace the lower half of a positive matrix of six rows by its Cholesky factor."""
-    for i in range(6):
+def factorise(matrix: Any, size: int) -> None:
+    """Replace the lower half of a positive definite matrix by its Cholesky factor."""
+    for i in range(size):
         for j in range(i + 1):
-            total = matrix[6 * i + j]
+            total = matrix[size * i + j]
             for k in range(j):
-                total -= matrix[6 * i + k] * matrix[6 * j + k]
-            matrix[6 * i + j] = sqrt(total) if i == j else total / matrix[7 * j]
+                total -= matrix[size * i + k] * matrix[size * j + k]
+            matrix[size * i + j] = sqrt(total) if i == j else total / matrix[(size + 1) * j]
 
 
-def forward(factor: Floats, vector: Any, at: int) -> None:
-    """Solve with a lower triangular factor of six rows, in place."""
-    for i in range(6):
-        total = vector[at + i]
+def forward(factor: Floats, size: int, vector: Any, at: int) -> None:
+    """Solve with a lower triangular factor in place, from an entry of the vector on."""
+    for i in range(size):
         for k in range(i):
-            total -= factor[6 * i + k] * vector[at + k]
-        vector[at + i] = total / factor[7 * i]
+            vector[at + i] -= factor[size * i + k] * vector[at + k]
+        vector[at + i] /= factor[(size + 1) * i]
 
 
-def solve(matrix: Any, size: int, vector: Any) -> None:
-    """Solve a symmetric positive definite system in place."""
-    for k in range(size):
-        for i in range(k + 1, size):
-            share = matrix[size * i + k] / matrix[size * k + k]
-            for j in range(k, size):
-                matrix[size * i + j] -= share * matrix[size * k + j]
-            vector[i] -= share * vector[k]
-    for k in range(size - 1, -1, -1):
-        for j in range(k + 1, size):
-            vector[k] -= matrix[size * k + j] * vector[j]
-        vector[k] /= matrix[size * k + k]
+def backward(factor: Floats, size: int, vector: Any) -> None:
+    """Solve with the transpose of a lower triangular factor in place."""
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            vector[i] -= factor[size * k + i] * vector[k]
+        vector[i] /= factor[(size + 1) * i]

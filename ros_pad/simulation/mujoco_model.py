@@ -151,18 +151,13 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
 
 def _drive_xml(robot: Robot) -> tuple[str, str]:
     """Return what joints and motors of a robot have in common, and its motors, in XML."""
-    servo = robot.servo
+    servo, defaults, motors = robot.servo, '', ''
     if servo:
-        return (
-            f'<joint damping="{servo.damping!r}" armature="{servo.rotor_inertia!r}"/><position'
-            f' kp="{servo.stiffness!r}" forcerange="{-servo.torque!r} {servo.torque!r}"/>',
-            ''.join(f'<position joint="{escape(name)}"/>' for name in robot.joint_names),
-        )
-    motors = ''
+        defaults = f'<joint damping="{servo.damping!r}"/><position kp="{servo.stiffness!r}"/>'
     for joint in (each for leg in robot.chains.legs for each in leg):
-        most = min(joint.effort, 1e9)
-        motors += f'<motor joint="{escape(joint.name)}" forcerange="{-most!r} {most!r}"/>'
-    return f'<joint armature="{robot.rotor_inertia!r}"/>', motors
+        most, kind = min(joint.torque, 1e9), 'position' if servo else 'motor'
+        motors += f'<{kind} joint="{escape(joint.name)}" forcerange="{-most!r} {most!r}"/>'
+    return defaults, motors
 
 
 def _trunk_inertial(scene: Scene) -> str:
@@ -216,10 +211,12 @@ def _leg_xml(leg: int, robot: Robot, scale: float) -> str:
         end = joints[place + 1].at[:3, 3] if place + 1 < len(joints) else foot
         kind = 'type="slide" ' if joint.slides else ''
         link = joint.name + '_link' * (joint.name in ('world', 'trunk', 'sled'))
+        rotor = joint.rotor_inertia or 4e-3 * robot.mass * robot.height**2  # as of a Go2
         text += (
             f'<body name="{escape(link)}" {at_frame(joint.at)}>'
             f'<joint {kind}name="{escape(joint.name)}"'
-            f' axis="{words(joint.axis)}"/>{_rod_xml(scale * joint.mass, joint.centre, end)}'
+            f' axis="{words(joint.axis)}" armature="{rotor!r}"/>'
+            f'{_rod_xml(scale * joint.mass, joint.centre, end)}'
         )
         ends += '</body>'
     tip[2, 3] += POINT

@@ -185,9 +185,9 @@ def check_strength(scene: Scene) -> None:
     needed = share * np.abs(robot.kinematics(robot.home).jacobians[:, 2])
     for leg, torques in zip(robot.chains.legs, needed.tolist(), strict=True):
         for joint, torque in zip(leg, torques, strict=True):
-            if torque > joint.effort:
+            if torque > joint.torque:
                 raise ConfigError(
-                    f'{scene.source}: {joint.name} has {joint.effort:g} N m: at least'
+                    f'{scene.source}: {joint.name} has {joint.torque:g} N m: at least'
                     f' {torque:.3g} N m is needed to stand on {gait.fewest} legs with'
                     f' {body.mass:g} kg; or let more legs stand (gait.duty)'
                 )

@@ -77,7 +77,9 @@ def test_forces_are_those_of_a_general_solver(legs):
         feet[STANDS], feet[GRIP] = 1.0, random.uniform(0.1, 0.6, legs)
         turn = np.eye(3).ravel()
         table = feet.tolist()
-        share_out(plan_of(legs, mass), table, [0.0] * 3, turn, inertia, wrench, places.tolist())
+        share_out(
+            plan_of(legs, mass), table, [0.0] * 3, turn, inertia, list(wrench), places.tolist()
+        )
         found = np.array(table)[FORCE : FORCE + 3].T
         arms = np.array([np.cross(place, np.eye(3)).T for place in places])
         matrix = np.concatenate([np.hstack([np.eye(3)] * legs), np.hstack(arms)])
@@ -158,7 +160,7 @@ def test_a_walk_that_cannot_go_on_says_so():
 def test_torque_and_speed_limits_hold():
     weak = dataclasses.replace(SCENE, cycles=6)
     robot = FullRobot(weak, weak.floor.build(0), 0.004)
-    effort = [joint.effort for leg in weak.body.robot.chains.legs for joint in leg]
+    effort = [joint.torque for leg in weak.body.robot.chains.legs for joint in leg]
     for _ in range(900):
         robot.step([0.0] * 4)
         assert (np.abs(robot.data.actuator_force) <= np.array(effort) + 1e-9).all()

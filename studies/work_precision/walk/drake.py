@@ -139,7 +139,7 @@ class DrakeRobot:
                 )
             )  # fmt: skip
             motor = plant.AddJointActuator(f'{joint.name}_motor', added)
-            motor.set_default_rotor_inertia(servo.rotor_inertia)
+            motor.set_default_rotor_inertia(joint.rotor_inertia)
             motor.set_default_gear_ratio(1.0)
             self._joints.append(added)
             parent = link
@@ -238,8 +238,9 @@ class DrakeRobot:
         for number in range(1, self._substeps + 1):
             angles = plant.GetPositions(context)[self._places]
             torque = servo.stiffness * (self._targets - angles)
+            most = self._robot.chains.legs[0][0].torque
             self._motors.GetMutableData().get_mutable_value().SetFromVector(
-                np.clip(torque, -servo.torque, servo.torque)
+                np.clip(torque, -most, most)
             )
             self._push()
             self._simulator.AdvanceTo(start + number * self._dt)
