@@ -12,16 +12,15 @@ import numpy as np
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
 from ros_pad.simulation import balance_step, compiled
-from ros_pad.simulation.balance_step import GOAL, ROWS, Plan
+from ros_pad.simulation.balance_step import GOAL, ROWS, Plan, State
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.scene import Scene
 
 
 def plan(scene: Scene, period: float) -> Plan:
-    """Return what stays during the walks of a scene; all gains follow from size, mass and gait."""
+    """Return what stays during the walks of a scene."""
     body, gait = scene.legged
     homes = np.array(body.homes)
-    pendulum = math.sqrt(GRAVITY / body.height)  # rad/s: how fast the body falls over a foot
     return Plan(
         legs=len(homes),
         joints=body.robot.home.shape[1],
@@ -34,15 +33,7 @@ def plan(scene: Scene, period: float) -> Plan:
         speeds=np.array([joint.speed for leg in body.robot.chains.legs for joint in leg]),
         height=-body.ground,
         mass=body.mass,
-        friction=0.6,
-        rise=2.0 * pendulum,
-        drift=0.5 * pendulum,
-        turn=2.0 * pendulum,
-        swing=14.0 * pendulum,
-        capture=1.0 / pendulum,
-        slow=3.0 * gait.cycle,
-        forgetting=2.0 * gait.cycle,
-        slip=0.05 * GRAVITY / pendulum,
+        pendulum=math.sqrt(GRAVITY / body.height),
     )
 
 
@@ -76,16 +67,16 @@ class Balance:
         self._plan = plan(scene, period)
         legs, count = self._plan.legs, self._plan.legs * self._plan.joints
         self._goal = np.zeros(GOAL)
-        self._goal[balance_step.FRICTION] = self._plan.friction
+        self._goal[balance_step.FRICTION] = balance_step.USUAL_GRIP
         self._goal[balance_step.CENTRE_X : balance_step.CENTRE_Y + 1] = np.mean(body.homes, 0)
         self._feet = np.zeros((ROWS, legs))
         self._feet[balance_step.STANDS] = 1.0
-        self._feet[balance_step.GRIP] = self._plan.friction
+        self._feet[balance_step.GRIP] = balance_step.USUAL_GRIP
         self._inertia = np.zeros((model.nv, model.nv))
         self._mujoco, self._model, self._data = mujoco, model, data
         first = model.geom('foot_1').id
         # MuJoCo's joints are the free one of the base, then those of the legs.
-        self._state = (
+        self._state = State(
             data.qpos[:3],
             data.qvel[: 6 + count],
             data.xmat[model.body('trunk').id],
@@ -99,13 +90,9 @@ class Balance:
         )
         self._step = _plain
         if compiled.worth_loading(balance_step, scene.duration / period):
-            given = self._plan, self._goal, self._feet, *self._state
+            given = self._plan, self._goal, self._feet, self._state
             self._step = compiled.step(balance_step, *given)
         self.swings = [False] * legs
-
-    def place(self) -> None:
-        """Compute inertia and gravity for the first torques."""
-        self._mujoco.mj_forward(self._model, self._data)
 
     def lost(self, joints: Sequence[float]) -> str:
         """Return an empty text: joints that take torques have no set-point."""
@@ -120,7 +107,7 @@ class Balance:
             goal[balance_step.X] += speed * self._plan.period
             goal[balance_step.SPEED_X], goal[balance_step.GAIN_X] = speed, gain
         self._mujoco.mj_fullM(self._model, self._data, self._inertia)
-        self._step(self._plan, goal, self._feet, *self._state)
+        self._step(self._plan, goal, self._feet, self._state)
         phases, stands = self._feet[balance_step.PHASE], self._feet[balance_step.STANDS]
         self.swings = ((phases >= self._plan.duty) & (stands < 0.5)).tolist()
 
@@ -132,9 +119,9 @@ def motion(gait: WalkingGait, time: float) -> tuple[float, float]:
     return (after - before) / 2e-3, (after - 2.0 * now + before) / 1e-6
 
 
-def _plain(plan: Plan, goal: Array, feet: Array, *state: Array) -> bool:
+def _plain(plan: Plan, goal: Array, feet: Array, state: State) -> bool:
     """Step in plain Python, which is faster on lists."""
-    lists = [goal.tolist(), feet.tolist(), *(each.tolist() for each in state)]
-    done = balance_step.step(plan, *lists)
-    goal[:], feet[:], state[-1][:] = lists[0], lists[1], lists[-1]
+    goals, table, lists = goal.tolist(), feet.tolist(), State(*(each.tolist() for each in state))
+    done = balance_step.step(plan, goals, table, lists)
+    goal[:], feet[:], state.torques[:] = goals, table, lists.torques
     return done

@@ -23,6 +23,8 @@ Floats = Sequence[float]
 AHEAD = 0.8  # share of a swing after which its end stays: a foot that still moves scuffs
 TOP = 0.4  # share of a swing at which the foot is highest
 TRUST = 0.8  # share of the friction of a slip that the next force may use
+SLOW = 3.0  # cycles in which the feet come to stand round another point
+USUAL_GRIP = 0.6  # friction that a foot is taken to have before it slips
 LEAST_GRIP = 0.02  # friction below which no foot is taken to be
 LOADED = 0.01  # share of the weight from which a foot stands
 UNLOADED = 0.02  # s without load after which a standing foot has lost the ground
@@ -59,7 +61,7 @@ GOAL = 11
 
 
 class Plan(NamedTuple):
-    """What stays during a walk; frequencies are those of critically damped motions, rad/s."""
+    """What stays during a walk."""
 
     legs: int
     joints: int  # of a leg
@@ -72,33 +74,26 @@ class Plan(NamedTuple):
     speeds: Any  # largest of each joint, rad/s
     height: float  # of the base above the ground, m
     mass: float  # kg
-    friction: float  # coefficient that a foot is taken to have before it slips
-    rise: float  # frequency of the height
-    drift: float  # of the place
-    turn: float  # of the attitude
-    swing: float  # of a swinging foot
-    capture: float  # s: a foot lands so much further for each m/s too fast
-    slow: float  # s: for centre and ground
-    forgetting: float  # s: for the friction of a slip
-    slip: float  # m/s from which a foot slips
+    pendulum: float  # how fast the body falls over a foot, rad/s
 
 
-def step(
-    plan: Plan,
-    goal: Any,
-    feet: Any,
-    q: Floats,
-    v: Floats,
-    turn: Floats,
-    mass: Any,
-    bias: Floats,
-    places: Any,
-    anchors: Any,
-    axes: Any,
-    contacts: Any,
-    torques: Any,
-) -> bool:
-    """Set the torques of all joints, N m, for the next period.
+class State(NamedTuple):
+    """What the robot knows of itself, and what it does; arrays or lists of the same shapes."""
+
+    q: Any  # (3 …): place of the base, m
+    v: Any  # (6 + joints): its velocity in the world, m/s, its own rates, rad/s; of the joints
+    turn: Any  # (9,): rotation from the base to the world, row by row
+    mass: Any  # (6 + joints, 6 + joints): inertia, in the order of v
+    bias: Any  # (6 + joints): forces of gravity and inertia, in the order of v
+    places: Any  # (legs, 3): places of the feet, m
+    anchors: Any  # (joints, 3): places of the joints, m
+    axes: Any  # (joints, 3): their axes
+    contacts: Any  # (legs, 6): first the load of a foot, N, then two tangential forces, N
+    torques: Any  # (joints,): the result, N m
+
+
+def step(plan: Plan, goal: Any, feet: Any, state: State) -> bool:
+    """Set the torques of all joints for the next period.
 
     Parameters
     ----------
@@ -108,23 +103,12 @@ def step(
         Goal of the body; changed in its last entries.
     feet : array (ROWS, legs)
         State of the feet; changed.
-    q, v : array
-        Place of the base, m, and its velocities: in the world, m/s, and about its own axes,
-        rad/s, then of the joints, rad/s.
-    turn : array (9,)
-        Rotation from the base to the world, row by row.
-    mass, bias : array (6 + all joints, …)
-        Inertia matrix and forces of gravity and inertia, in the order of ``v``.
-    places : array (legs, 3)
-        Places of the feet, m.
-    anchors, axes : array (all joints, 3)
-        Places, m, and axes of the joints.
-    contacts : array (legs, 6)
-        First the load of each foot, N, then two tangential forces, N.
-    torques : array (all joints,)
-        The result.
+    state : State
+        Place and motion of the robot; its torques are changed.
     """
     legs, count = plan.legs, plan.legs * plan.joints
+    v, mass, bias, places = state.v, state.mass, state.bias, state.places
+    anchors, axes, contacts = state.anchors, state.axes, state.contacts
     jacobians = [0.0] * (3 * count)
     for leg in range(legs):
         x, y, z = places[leg][0], places[leg][1], places[leg][2]
@@ -137,15 +121,15 @@ def step(
     pulls = [0.0] * count  # accelerations of the joints of swinging legs
     speed = [0.0] * 3
     for leg in range(legs):
-        of_foot(plan, leg, q, v, turn, places, jacobians, speed)
+        of_foot(plan, leg, state, jacobians, speed)
         load = contacts[leg][0]
         find_ground(plan, leg, goal, feet, load > LOADED * plan.mass * GRAVITY, places[leg])
         find_grip(plan, leg, feet, speed, contacts[leg])
         if feet[STANDS][leg] < 0.5:
-            aim(plan, leg, goal, feet, q, v, turn)
+            aim(plan, leg, goal, feet, state)
             swing(plan, leg, feet, places[leg], speed, jacobians, pulls)
     wanted = [0.0] * 6
-    wish(plan, goal, feet, q, v, turn, places, wanted)
+    wish(plan, goal, feet, state, wanted)
     wrench = [0.0] * 6
     for row in range(6):
         total = bias[row]
@@ -154,8 +138,8 @@ def step(
         for i in range(count):  # the recoil of swinging legs
             total += mass[row][6 + i] * pulls[i]
         wrench[row] = total
-    stand_round(plan, goal, turn, wrench, places)
-    share_out(plan, feet, q, turn, mass, wrench, places)
+    stand_round(plan, goal, state, wrench)
+    share_out(plan, feet, state, wrench)
     for leg in range(legs):
         for i in range(leg * plan.joints, (leg + 1) * plan.joints):
             total = bias[6 + i]
@@ -164,15 +148,13 @@ def step(
             for axis in range(3):
                 total -= jacobians[3 * i + axis] * feet[FORCE + axis][leg]
             fast = v[6 + i] * total > 0.0 and abs(v[6 + i]) > plan.speeds[i]
-            torques[i] = 0.0 if fast else total
+            state.torques[i] = 0.0 if fast else total
     return True
 
 
-def of_foot(
-    plan: Plan, leg: int, q: Floats, v: Floats, turn: Floats, places: Any, jacobians: Floats,
-    speed: Any,
-) -> None:  # fmt: skip
+def of_foot(plan: Plan, leg: int, state: State, jacobians: Floats, speed: Any) -> None:
     """Set the velocity of a foot in the world, m/s."""
+    q, v, turn, places = state.q, state.v, state.turn, state.places
     x, y, z = places[leg][0] - q[0], places[leg][1] - q[1], places[leg][2] - q[2]
     a = turn[0] * v[3] + turn[1] * v[4] + turn[2] * v[5]
     b = turn[3] * v[3] + turn[4] * v[4] + turn[5] * v[5]
@@ -207,16 +189,18 @@ def find_ground(plan: Plan, leg: int, goal: Any, feet: Any, loaded: bool, place:
 def find_grip(plan: Plan, leg: int, feet: Any, speed: Floats, contact: Floats) -> None:
     """Remember the friction of a foot that slips, for a while."""
     grip = feet[GRIP][leg]
-    grip += plan.period / plan.forgetting * (plan.friction - grip)
-    slips = speed[0] * speed[0] + speed[1] * speed[1] > plan.slip * plan.slip
+    grip += plan.period / (2.0 * plan.cycle) * (USUAL_GRIP - grip)
+    slip = 0.05 * GRAVITY / plan.pendulum
+    slips = speed[0] * speed[0] + speed[1] * speed[1] > slip * slip
     if slips and feet[STANDS][leg] > 0.5 and contact[0] > LOADED * plan.mass * GRAVITY:
         side = sqrt(contact[1] * contact[1] + contact[2] * contact[2])
         grip = max(LEAST_GRIP, min(grip, TRUST * side / contact[0]))
     feet[GRIP][leg] = grip
 
 
-def aim(plan: Plan, leg: int, goal: Any, feet: Any, q: Floats, v: Floats, turn: Floats) -> None:
+def aim(plan: Plan, leg: int, goal: Any, feet: Any, state: State) -> None:
     """Set where a foot without ground should be: on its swing, or on its fall after that."""
+    q, v, turn = state.q, state.v, state.turn
     share = (feet[PHASE][leg] - plan.duty) / (1.0 - plan.duty)
     if share < 0.0:
         # A foot that finds no ground in time falls.
@@ -236,7 +220,7 @@ def aim(plan: Plan, leg: int, goal: Any, feet: Any, q: Floats, v: Floats, turn: 
         # A foot so far off accelerates the body by g/height, which friction has to carry.
         most = 0.5 * goal[FRICTION] * plan.height
         for axis in range(2):
-            ahead = plan.capture * (v[axis] - goal[SPEED_X + axis])
+            ahead = (v[axis] - goal[SPEED_X + axis]) / plan.pendulum
             feet[TO_X + axis][leg] = (
                 q[axis] + goal[CENTRE_X + axis] + home[axis] + v[axis] * left
                 + goal[SPEED_X + axis] * half + max(-most, min(most, ahead))
@@ -279,11 +263,11 @@ def swing(
     plan: Plan, leg: int, feet: Any, place: Floats, speed: Floats, jacobians: Floats, pulls: Any
 ) -> None:
     """Set the accelerations of joints, rad/s², that bring a foot to its aim."""
-    pull, square = [0.0] * 3, [0.0] * 9
+    pull, square, fast = [0.0] * 3, [0.0] * 9, 14.0 * plan.pendulum
     for axis in range(3):
         away = feet[AIM_X + axis][leg] - place[axis]
         late = feet[RATE_X + axis][leg] - speed[axis]
-        pull[axis] = plan.swing * (plan.swing * away + 2.0 * late) + feet[PULL_X + axis][leg]
+        pull[axis] = fast * (fast * away + 2.0 * late) + feet[PULL_X + axis][leg]
         for other in range(3):
             total = 0.0
             for i in range(leg * plan.joints, (leg + 1) * plan.joints):
@@ -303,38 +287,40 @@ def swing(
         pulls[i] = total
 
 
-def wish(
-    plan: Plan, goal: Any, feet: Any, q: Floats, v: Floats, turn: Floats, places: Any, wanted: Any
-) -> None:
+def wish(plan: Plan, goal: Any, feet: Any, state: State, wanted: Any) -> None:
     """Set the acceleration that the body should have: in the world, then about its own axes."""
+    q, v, turn = state.q, state.v, state.turn
+    # Frequencies of critically damped motions, rad/s.
+    firm, slack = 2.0 * plan.pendulum, 0.5 * plan.pendulum
     standing, ground, friction = 0, 0.0, 0.0
     for leg in range(plan.legs):
         friction += feet[GRIP][leg] / plan.legs
         if feet[STANDS][leg] > 0.5:
-            standing, ground = standing + 1, ground + places[leg][2]
+            standing, ground = standing + 1, ground + state.places[leg][2]
     if standing:
-        goal[GROUND] += plan.period / plan.slow * (ground / standing - goal[GROUND])
+        goal[GROUND] += plan.period / (SLOW * plan.cycle) * (ground / standing - goal[GROUND])
     goal[FRICTION] = friction
-    most = friction * GRAVITY / (plan.drift * plan.drift)
+    most = friction * GRAVITY / (slack * slack)
     for axis in range(2):
         # The goal waits for a body that friction cannot bring there.
         goal[X + axis] = max(q[axis] - most, min(q[axis] + most, goal[X + axis]))
-        wanted[axis] = goal[GAIN_X + axis] + plan.drift * (
-            plan.drift * (goal[X + axis] - q[axis]) + 2.0 * (goal[SPEED_X + axis] - v[axis])
+        wanted[axis] = goal[GAIN_X + axis] + slack * (
+            slack * (goal[X + axis] - q[axis]) + 2.0 * (goal[SPEED_X + axis] - v[axis])
         )
-    wanted[2] = plan.rise * (plan.rise * (plan.height + goal[GROUND] - q[2]) - 2.0 * v[2])
+    wanted[2] = firm * (firm * (plan.height + goal[GROUND] - q[2]) - 2.0 * v[2])
     # The small rotation, about its own axes, that would make the base level with heading 0.
     off = 0.5 * (turn[5] - turn[7]), 0.5 * (turn[6] - turn[2]), 0.5 * (turn[1] - turn[3])
     for axis in range(3):
-        wanted[3 + axis] = plan.turn * (plan.turn * off[axis] - 2.0 * v[3 + axis])
+        wanted[3 + axis] = firm * (firm * off[axis] - 2.0 * v[3 + axis])
 
 
-def stand_round(plan: Plan, goal: Any, turn: Floats, wrench: Floats, places: Any) -> None:
+def stand_round(plan: Plan, goal: Any, state: State, wrench: Floats) -> None:
     """Let the feet stand round the point of the ground about which the wrench has no moment."""
+    turn = state.turn
     about_x = turn[0] * wrench[3] + turn[1] * wrench[4] + turn[2] * wrench[5]
     about_y = turn[3] * wrench[3] + turn[4] * wrench[4] + turn[5] * wrench[5]
     waits = goal[TIME] < 0.0
-    share = plan.period / (0.2 if waits else plan.slow)
+    share = plan.period / (0.2 if waits else SLOW * plan.cycle)
     x = -(about_y + plan.height * wrench[0]) / wrench[2]
     y = (about_x - plan.height * wrench[1]) / wrench[2]
     goal[CENTRE_X] += share * (x - goal[CENTRE_X])
@@ -343,14 +329,13 @@ def stand_round(plan: Plan, goal: Any, turn: Floats, wrench: Floats, places: Any
         for axis in range(2):
             total = 0.0
             for leg in range(plan.legs):
-                total += places[leg][axis]
+                total += state.places[leg][axis]
             goal[X + axis] = total / plan.legs - goal[CENTRE_X + axis]
 
 
-def share_out(
-    plan: Plan, feet: Any, q: Floats, turn: Floats, mass: Any, wrench: Any, places: Any
-) -> None:
+def share_out(plan: Plan, feet: Any, state: State, wrench: Any) -> None:
     """Set the forces of the standing feet, N, whose wrench is nearest; the wrench is used up."""
+    q, turn, mass, places = state.q, state.turn, state.mass, state.places
     legs = plan.legs
     low = [0.0] * 36  # Cholesky factor of the body's inertia
     for i in range(6):

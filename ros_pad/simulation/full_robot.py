@@ -176,9 +176,9 @@ class FullRobot:
         data.qpos[2] = height + self.soles.place(self._drive.places)
         if self._sled:
             data.qpos[len(self._state)] = -self._sled.distance
-        self._mujoco.mj_kinematics(self.model, data)
+        self._mujoco.mj_fwdPosition(self.model, data)
+        self._mujoco.mj_fwdVelocity(self.model, data)
         self.soles.update()
-        self._drive.place()
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg.

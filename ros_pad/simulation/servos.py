@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
 from ros_pad.simulation.gait import FootPath, Place
@@ -39,13 +38,11 @@ class Servos:
 
     def __init__(self, scene: Scene, solver: FeetSolver, period: float, setpoints: Array) -> None:
         body, gait = scene.legged
-        assert body.robot.servo is not None
-        self._robot, self._servo = body.robot, body.robot.servo
+        self._robot = body.robot
         self._solver = solver
         self._period = period
         self._settle = scene.settle
         self._gain = scene.heading_gain
-        self._weight = body.mass * GRAVITY
         self._path = FootPath(gait, [(x, y, body.ground) for x, y in body.homes])
         self.targets = solver.angles([(x, y, body.ground) for x, y, _ in self._path.feet])
         self._setpoints = setpoints
@@ -60,9 +57,6 @@ class Servos:
     def swings(self) -> list[bool]:
         """Whether each of them swings."""
         return self._path.swings
-
-    def place(self) -> None:
-        """Do nothing: set-points need no forces."""
 
     def act(self, time: float, heading: float) -> None:
         """Set all set-points for a time, s, with a heading of the body, rad.

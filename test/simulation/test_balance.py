@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from ros_pad.simulation import Scene, compiled
-from ros_pad.simulation.balance_step import FORCE, GRIP, ROWS, STANDS, Plan, share_out
+from ros_pad.simulation.balance_step import FORCE, GRIP, ROWS, STANDS, Plan, State, share_out
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.terrain import Floor
 
@@ -77,9 +77,8 @@ def test_forces_are_those_of_a_general_solver(legs):
         feet[STANDS], feet[GRIP] = 1.0, random.uniform(0.1, 0.6, legs)
         turn = np.eye(3).ravel()
         table = feet.tolist()
-        share_out(
-            plan_of(legs, mass), table, [0.0] * 3, turn, inertia, list(wrench), places.tolist()
-        )
+        state = State(np.zeros(3), None, turn, inertia, None, places, *[None] * 4)
+        share_out(plan_of(legs, mass), table, state, list(wrench))
         found = np.array(table)[FORCE : FORCE + 3].T
         arms = np.array([np.cross(place, np.eye(3)).T for place in places])
         matrix = np.concatenate([np.hstack([np.eye(3)] * legs), np.hstack(arms)])
