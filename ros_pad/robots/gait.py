@@ -151,15 +151,20 @@ class Gait:
         ConfigError
             When a value is missing or not allowed.
         """
-        own = {} if usual is None else vars(usual)
-        cycle, duty, lift = (
-            table.number(key, *allowed, **({'default': own[key]} if own else {}))
-            for key, allowed in _RANGES.items()
-        )
+        if usual is None:
+            cycle, duty, lift = (table.number(key, *each) for key, each in _RANGES.items())
+        else:
+            duty, lift = (
+                table.number(key, *_RANGES[key], default=getattr(usual, key))
+                for key in ('duty', 'lift')
+            )
+            # Legs swing as long as they usually do.
+            cycle = usual.cycle * ((1.0 - usual.duty) / (1.0 - duty))
+            cycle = table.number('cycle', *_RANGES['cycle'], default=cycle)
         pushes = False
         try:
-            if own and 'kind' not in table:
-                phases, pushes = own['phases'], own['pushes']
+            if usual and 'kind' not in table:
+                phases, pushes = usual.phases, usual.pushes
             elif (kind := table.choice('kind', (*GAITS, 'own'))) == 'own':
                 size = len(np.asarray(hips))
                 phases = tuple(table.vector('phases', '(share)', size, 0.0, 1.0).tolist())

@@ -13,7 +13,7 @@ from ros_pad.robots.gait import Gait
 from ros_pad.robots.rotation import Array
 
 FROUDE = 0.03
-"""Froude number v²/(g h) of a walk whose scene gives no stride: a slow walk."""
+"""Froude number v²/(g h) of a trot whose scene gives no stride: a slow walk."""
 
 _TRIES = 4000  # postures of a leg
 _WIDEST = 0.75 * math.pi  # rad from zero, for joints with wider limits
@@ -66,12 +66,13 @@ def _bent(leg: Sequence[Joint], foot: Array) -> Array:
 def usual_gait(hips: Array, height: float) -> Gait:
     """Return a gait for legs at these hips, m, that carry a body at a height, m.
 
-    A trot of four legs and a tripod of six or eight, else one leg after another; a cycle takes
-    half as long as the swing of a pendulum from that height.
+    A trot of four legs and a tripod of six or eight, else one leg after another. A cycle of the
+    first two takes half as long as the swing of a pendulum from that height; legs swing as long
+    in the others.
     """
     kind = {4: 'trot', 6: 'tripod', 8: 'tripod'}.get(len(hips), 'wave')
     duty = 0.6 if kind != 'wave' else max(0.75, 1.0 - 1.0 / len(hips))
     # Sizes that no robot has are refused elsewhere.
     height = min(max(height, 0.01), 5.0)
-    cycle = math.pi * math.sqrt(height / 9.81)
+    cycle = 0.4 / (1.0 - duty) * math.pi * math.sqrt(height / 9.81)
     return Gait.named(kind, hips, cycle, duty, lift=0.16 * height)

@@ -581,8 +581,9 @@ def _walking_gait(table: Table, robot: Robot) -> WalkingGait:
 
 
 def _usual_stride(robot: Robot, gait: Gait) -> float:
-    """Return the stride of a slow walk, m, that of a small Froude number."""
-    return round(math.sqrt(FROUDE * GRAVITY * robot.height) * gait.cycle, 4)
+    """Return the stride, m, of a slow trot; feet of other gaits swing as fast as in it."""
+    swing = 2.5 * (1.0 - gait.duty) * gait.cycle
+    return round(math.sqrt(FROUDE * GRAVITY * robot.height) * swing, 4)
 
 
 def _air_line(table: Table) -> dict[str, Any]:

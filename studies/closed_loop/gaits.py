@@ -53,14 +53,10 @@ def scene_of(urdf: str, feet: Sequence[str], case: str, cycles: int) -> Scene:
     }
     if feet:
         table['feet'] = list(feet)
+    if gait:
+        table['gait'] = gait
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / 'scene.yaml'
-        file.write_text(yaml.safe_dump(table))
-        if not gait:
-            return Scene.load(file)
-        usual = Scene.load(file).legged[1]
-        slower = {'cycle': 2.0 * usual.cycle, 'lift': usual.lift, 'stride': usual.stride}
-        table['gait'] = gait | slower
         file.write_text(yaml.safe_dump(table))
         return Scene.load(file)
 
