@@ -14,6 +14,7 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
+from ros_pad.simulation.balance_step import USUAL_GRIP
 from ros_pad.simulation.scene import Scene
 
 Vector = tuple[float, float, float]
@@ -198,7 +199,8 @@ def check_tow(scene: Scene) -> None:
     (body, gait), tow, slope = scene.legged, scene.tow, scene.floor.slope
     legs, weight = len(gait.middles), body.mass * GRAVITY
     foot = scene.foot.on_rough(scene.floor.roughness)
-    grip = legs * foot.grip(weight * math.cos(slope) / legs, 0.0)
+    load = weight * math.cos(slope)
+    grip = min(legs * foot.grip(load / legs, 0.0), USUAL_GRIP * load)
     uphill = weight * math.sin(slope)
     each = tow.friction_dry * math.cos(slope) + math.sin(slope)  # N for each N of the tow
     if uphill + tow.weight * each > grip:
