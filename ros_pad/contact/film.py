@@ -1,21 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drainage of the liquid film under a pad.
 
-A disc of radius a, pressed with pressure p on a film of thickness h and viscosity η, follows the
-Stefan-Reynolds equation dh/dt = -2 p h³ / (3 η a²). In 1/h² it is linear, d(1/h²)/dt =
-4 p / (3 η a²). :class:`Film` stores 1/h², so its time steps are exact.
+A rigid disc of radius a, pressed with pressure p on a film of thickness h and viscosity η, follows
+the Stefan-Reynolds equation dh/dt = -2 p h³ / (3 η a²). In 1/h² it is linear, d(1/h²)/dt =
+4 p / (3 η a²), so time steps are exact.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ros_pad.configuration import number, quantity
-from ros_pad.contact.laws import drained
+from ros_pad.contact import laws
 from ros_pad.contact.pad import broadcast, plain
 
 if TYPE_CHECKING:
@@ -80,9 +79,10 @@ class Film:
     """The liquid film under one foot during one stance: under its domes and under its flat sole.
 
     The film drains while the foot stands. When the foot slips, the film is assumed to move with
-    it, without new liquid (docs/assumptions.md). The contact area of domes grows with their load,
-    and the added area has not drained yet: 1/h² is averaged over the area. So a light load at
-    touch-down does not drain the area that touches later.
+    it, without new liquid (docs/assumptions.md). The flat sole is a rigid disc. Under a dome, a
+    contact that grows lays the thicker a film the faster it grows, and the rim of a contact that
+    rests levels it from the edge inwards: how much of a dome is dry follows from how its load has
+    come (:mod:`ros_pad.contact.laws`).
 
     Parameters
     ----------
@@ -93,10 +93,12 @@ class Film:
 
     Attributes
     ----------
-    dome_drain, sole_drain : float
-        Factors of the growth of 1/h² under domes and sole, 1/(Pa s) and 1/(Pa s m²).
-    sole_area : float
-        Area of the sole, m².
+    spheres : list of float
+        Radius of the free dome, m, in the steps of pressure of :attr:`Foot.limits`.
+    cell : float
+        Area of a cell of a dome's contact, m².
+    sole_drain : float
+        Factor of the growth of 1/h² under the sole, 1/(Pa s m²).
 
     Raises
     ------
@@ -108,22 +110,23 @@ class Film:
     >>> from ros_pad.contact import Film, Foot
     >>> film = Film(Foot.load('large19'))
     >>> film.touch_down(0.3e-3)
-    >>> domes, sole = film.drain(dome_load=2.0, sole_load=0.0, pressure=75e3, duration=0.3)
-    >>> f'{1e6 * domes:.3f} and {1e6 * sole:.0f} micrometres'
-    '0.122 and 300 micrometres'
+    >>> for step in range(1, 301):  # the load comes in 10 ms
+    ...     load = 2.0 * min(1.0, step / 10)
+    ...     domes, sole = film.drain(load, sole_load=0.0, pressure=75e3, duration=1e-3)
+    >>> f'{1e6 * domes:.2f} and {1e6 * sole:.0f} micrometres'
+    '0.27 and 300 micrometres'
     """
 
-    __slots__ = ('_fresh', '_state', 'dome_drain', 'sole_area', 'sole_drain')
-
     def __init__(self, foot: Foot, viscosity: float = WATER_VISCOSITY) -> None:
-        number('viscosity', viscosity, 'Pa s', above=True)
-        # Each of n domes has a disc of radius b, b² = A/(n π), with total area A = N/p, so
-        # d(1/h²)/dt = 4 π n p / (3 η A).
-        self.dome_drain = 4.0 * math.pi * foot.pads / (3.0 * viscosity)
+        self.viscosity = number('viscosity', viscosity, 'Pa s', above=True)
+        self.pads, self.sole_area = foot.pads, foot.sole_area
+        self.critical_film, self.film_exponent = foot.critical_film, foot.film_exponent
+        self.limit_cell, self.spheres = foot.limit_cell, foot.spheres
+        # Of the largest contact of a dome: below its force limit.
+        areas = np.array(foot.limits[1:]) / (np.arange(1, len(foot.limits)) * foot.limit_cell)
+        self.cell = float(areas.max()) / (foot.pads * laws.CELLS)
         self.sole_drain = 4.0 / (3.0 * viscosity * foot.sole_radius**2)
-        self.sole_area = foot.sole_area
-        self._fresh = math.inf
-        self._state = 0.0, math.inf, math.inf
+        self._state = [0.0] * (laws.FILM + laws.CELLS)
 
     def touch_down(self, thickness: float) -> None:
         """Start a stance on a film.
@@ -138,9 +141,7 @@ class Film:
         InvalidInput
             When the thickness is negative or not finite.
         """
-        thickness = number('thickness', thickness, 'm')
-        self._fresh = thickness**-2 if thickness > 0.0 else math.inf
-        self._state = 0.0, self._fresh, self._fresh
+        laws.touch_down(self._state, number('thickness', thickness, 'm'))
 
     def drain(
         self, dome_load: float, sole_load: float, pressure: float, duration: float
@@ -150,18 +151,17 @@ class Film:
         Parameters
         ----------
         dome_load, sole_load : float
-            Normal force on the domes and on the flat sole, N, from 0.
+            Normal force on the domes and on the flat sole at the end, N, from 0; they change
+            evenly from those before.
         pressure : float
             Gauge pressure in the pads, Pa; above 0 if the domes carry load.
         duration : float
-            Time, s, from 0.
+            Time, s, above 0.
 
         Returns
         -------
         tuple of float
-            Thickness of the film under domes and flat sole, m.
+            Thickness of the film under domes and flat sole, m: of an even film that leaves as much
+            dry contact.
         """
-        self._state = drained(
-            self, self._fresh, self._state, dome_load, sole_load, pressure, duration
-        )
-        return self._state[1] ** -0.5, self._state[2] ** -0.5
+        return laws.drained(self, self._state, dome_load, sole_load, pressure, duration)

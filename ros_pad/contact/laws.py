@@ -9,50 +9,174 @@ and input is not checked.
 
 from __future__ import annotations
 
-from math import exp, inf
+from math import exp, inf, log, pi, sqrt
 from typing import Any
+
+CELLS = 32  # of the area of a dome's contact
+
+# Entries of the film under a foot. Thicknesses are in m; after the last one, the dry share of each
+# cell of equal area of a dome's contact, from the middle outwards.
+FILM = 5
+(
+    FRESH,  # thickness at touch-down
+    SOLE,  # 1/h² under the flat sole, 1/m²
+    AREA,  # contact area of one dome, m²
+    RIM,  # width of the rim that has levelled, m
+    CORE,  # thickness where that rim ends
+) = range(FILM)  # fmt: skip
+
+# Gauss' points of the rim, and their weights.
+POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
+WEIGHTS = (0.17392742256872692, 0.32607257743127305, 0.32607257743127305, 0.17392742256872692)
 
 
 def dome_load(foot: Any, load: float, pressure: float) -> float:
     """Return the part of a load, N, that domes carry at a gauge pressure, Pa."""
     if pressure <= 0.0:
         return 0.0
-    place = pressure / foot.limit_cell
-    limits, last = foot.limits, len(foot.limits) - 1
-    if place >= last:
-        limit = limits[last]
-    else:
-        index = int(place)
-        limit = limits[index] + (place - index) * (limits[index + 1] - limits[index])
+    limit = between(foot.limits, pressure / foot.limit_cell)
     return load if load < limit else limit
 
 
-def drained(
-    film: Any,
-    fresh: float,
-    state: tuple[float, float, float],
-    on_domes: float,
-    on_sole: float,
-    pressure: float,
-    time: float,
-) -> tuple[float, float, float]:
-    """Return the state of a film after a time, s, under loads, N, and a pressure, Pa.
+def between(values: Any, place: float) -> float:
+    """Return the value at a place in a table, from 0; after its end, the last one."""
+    last = len(values) - 1
+    if place >= last:
+        return values[last]
+    index = int(place)
+    return values[index] + (place - index) * (values[index + 1] - values[index])
 
-    The state has the contact area of the domes, m², and 1/h² under domes and sole, 1/m², which was
-    ``fresh`` at touch-down.
+
+def touch_down(film: Any, thickness: float) -> None:
+    """Start a stance on a film, m; 0 is dry ground."""
+    film[FRESH], film[AREA] = thickness, 0.0
+    film[SOLE] = thickness**-2 if thickness > 0.0 else inf
+
+
+def drained(
+    foot: Any, film: Any, on_domes: float, on_sole: float, pressure: float, time: float
+) -> tuple[float, float]:
+    """Drain a film for a time, s, under loads, N; return its thickness under domes and sole, m.
+
+    The film under domes is not even: the thickness is that with the same dry share.
     """
-    area, domes, sole = state
-    if on_domes > 0.0:
-        before, area = area, on_domes / pressure
-        if area > before and fresh < inf:
-            # Under the area that is new, the film has not drained yet.
-            domes = fresh + before / area * (domes - fresh)
-        domes += film.dome_drain * pressure / area * time
-    else:
-        area = 0.0
+    if film[FRESH] <= 0.0:
+        return 0.0, 0.0
     if on_sole > 0.0:
-        sole += film.sole_drain * on_sole / film.sole_area * time
-    return area, domes, sole
+        film[SOLE] += foot.sole_drain * on_sole / foot.sole_area * time
+    share = 1.0
+    if on_domes > 0.0:
+        area = on_domes / (foot.pads * pressure)
+        sphere = between(foot.spheres, pressure / foot.limit_cell)
+        spread(foot, film, area, pressure, sphere, time)
+        share = dry_share(foot, film, sphere)
+    else:
+        film[AREA] = 0.0
+    thin = foot.critical_film * (-log(max(share, 1e-300))) ** (1.0 / foot.film_exponent)
+    return min(thin, film[FRESH]) if share < 1.0 else 0.0, film[SOLE] ** -0.5
+
+
+def spread(foot: Any, film: Any, area: float, pressure: float, sphere: float, time: float) -> None:
+    """Change the contact area of a dome within a time, and let the rim of its film level.
+
+    A rim that advances at a speed V lays a film of 0.3215 R (24 η V/(p R))^⅔, as Bretherton's
+    bubbles do; at constant speed of the area that is proportional to the area to the power -⅓.
+    When the rim stands or recedes, suction by its curvature levels the film inwards from there.
+    """
+    before = film[AREA]
+    speed = abs(area - before) / (time * 2.0 * sqrt(pi * area))
+    laid = 0.3215 * sphere * (24.0 * foot.viscosity * speed / (pressure * sphere)) ** (2.0 / 3.0)
+    if area != before and before > 0.0:
+        keep_rim(foot, film, sphere)
+    film[AREA] = area
+    if area > before:
+        cell, at = int(before / foot.cell), before
+        while at < area:
+            end = min(area, (cell + 1) * foot.cell)
+            thickness = laid * (2.0 * area / (at + end)) ** (1.0 / 3.0)
+            mix(foot, film, cell, at, end, min(thickness, film[FRESH]))
+            cell, at = cell + 1, end
+        film[RIM], film[CORE] = 0.0, min(laid, film[FRESH])
+        return
+    if area < before:
+        share = film[FILM + min(int(area / foot.cell), CELLS - 1)]
+        share = min(max(share, 1e-300), 1.0 - 1e-12)
+        core = foot.critical_film * (-log(share)) ** (1.0 / foot.film_exponent)
+        film[RIM], film[CORE] = 0.0, min(core, film[FRESH])
+        if laid > 0.5 * core:
+            return
+    level(foot, film, pressure, sphere, time)
+
+
+def mix(foot: Any, film: Any, cell: int, start: float, end: float, thickness: float) -> None:
+    """Give a part of a cell, between two areas, m², a film; what lies before it stays."""
+    if cell < CELLS:
+        first = cell * foot.cell
+        kept = film[FILM + cell] * (start - first)
+        film[FILM + cell] = (kept + dry(foot, thickness) * (end - start)) / (end - first)
+
+
+def keep_rim(foot: Any, film: Any, sphere: float) -> None:
+    """Write the film of the rim into its cells, before the rim moves."""
+    if film[RIM] > 0.0:
+        area = film[AREA]
+        radius = sqrt(area / pi)
+        at = pi * (radius - film[RIM]) * (radius - film[RIM])
+        cell = int(at / foot.cell)
+        while at < area:
+            end = min(area, (cell + 1) * foot.cell)
+            inwards = radius - sqrt(0.5 * (at + end) / pi)
+            mix(foot, film, cell, at, end, rim_film(film, sphere, inwards))
+            cell, at = cell + 1, end
+
+
+def rim_film(film: Any, sphere: float, inwards: float) -> float:
+    """Return the thickness at a distance inwards from the edge of the contact, m: a wedge."""
+    slope = film[CORE] / film[RIM]
+    return max(0.78 * slope * slope * sphere, slope * inwards)
+
+
+def level(foot: Any, film: Any, pressure: float, sphere: float, time: float) -> None:
+    """Let the rim grow inwards, and the paraboloid drain that is left when it has met itself.
+
+    The pressure of the air drives the liquid through the thinnest place of the wedge.
+    """
+    core, rim, radius = film[CORE], film[RIM], sqrt(film[AREA] / pi)
+    if core <= 0.0:
+        return
+    tension = 0.5 * pressure * sphere
+    if rim < 0.5 * radius:
+        fourth = rim**4 + tension * core**3 / (6.0 * foot.viscosity) * time
+        sixth = fourth**1.5 + 0.605 * tension * sphere * core**4 / foot.viscosity * time
+        film[RIM] = min(0.5 * radius, sixth ** (1.0 / 6.0))
+    else:
+        rate = 12.9 * pressure * sphere * sphere / (foot.viscosity * radius**6)
+        film[CORE] = (core**-4 + rate * time) ** -0.25
+
+
+def dry_share(foot: Any, film: Any, sphere: float) -> float:
+    """Return the share of dry contact under a dome."""
+    area = film[AREA]
+    radius, rim = sqrt(area / pi), film[RIM]
+    inside = area if rim <= 0.0 else pi * (radius - rim) * (radius - rim)
+    whole = min(int(inside / foot.cell), CELLS)
+    total = 0.0
+    for cell in range(whole):
+        total += film[FILM + cell]
+    total *= foot.cell
+    if whole < CELLS:
+        total += film[FILM + whole] * (inside - whole * foot.cell)
+    if rim > 0.0:
+        for place, weight in zip(POINTS, WEIGHTS, strict=True):
+            inwards = place * rim
+            share = dry(foot, rim_film(film, sphere, inwards))
+            total += weight * rim * share * 2.0 * pi * (radius - inwards)
+    return total / area
+
+
+def dry(foot: Any, thickness: float) -> float:
+    """Return the share of dry contact that a film leaves."""
+    return exp(-((thickness / foot.critical_film) ** foot.film_exponent))
 
 
 def resistance(
@@ -75,9 +199,9 @@ def resistance(
     return total
 
 
-def on_film(foot: Any, dry: float, load: float, film: float) -> float:
-    """Return the resistance of a contact on a film, N; ``dry`` is its resistance without one."""
+def on_film(foot: Any, whole: float, load: float, film: float) -> float:
+    """Return the resistance of a contact on a film, N; ``whole`` is its resistance without one."""
     if film <= 0.0:
-        return dry
-    touching = exp(-((film / foot.critical_film) ** foot.film_exponent))
-    return touching * dry + (1.0 - touching) * foot.boundary_friction * load
+        return whole
+    touching = dry(foot, film)
+    return touching * whole + (1.0 - touching) * foot.boundary_friction * load

@@ -232,6 +232,12 @@ class Foot:
         """Step of pressure between them, Pa."""
         return self.ceiling / (len(self.limits) - 1)
 
+    @cached_property
+    def spheres(self) -> tuple[float, ...]:
+        """Radius of the free domes, m, at the pressures of :attr:`limits`; at 0 that of a pad."""
+        pressures = self.limit_cell * np.arange(1, len(self.limits))
+        return self.pad.radius, *inflate(self.pad, pressures).sphere_radius.tolist()
+
     def on_rough(self, roughness: float) -> Foot:
         """Return the foot with its constants on a rough floor.
 
