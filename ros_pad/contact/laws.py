@@ -38,6 +38,22 @@ def dome_load(foot: Any, load: float, pressure: float) -> float:
     return load if load < limit else limit
 
 
+def spring(foot: Any, depth: float, pressure: float) -> tuple[float, float]:
+    """Return force, N, and stiffness, N/m, of a foot at a depth below its first touch, m.
+
+    Domes are springs to their force limit, from which on the sole carries.
+    """
+    force, stiffness, limit = 0.0, 0.0, 0.0
+    if pressure > 0.0:
+        place = pressure / foot.limit_cell
+        stiffness, limit = between(foot.stiffnesses, place), between(foot.limits, place)
+        force = stiffness * depth
+    if force < limit:
+        return force, stiffness
+    flat = depth - limit / stiffness if stiffness > 0.0 else depth
+    return limit + foot.sole_stiffness * flat, foot.sole_stiffness
+
+
 def between(values: Any, place: float) -> float:
     """Return the value at a place in a table, from 0; after its end, the last one."""
     last = len(values) - 1
@@ -84,7 +100,7 @@ def spread(foot: Any, film: Any, area: float, pressure: float, sphere: float, ti
     When the rim stands or recedes, suction by its curvature levels the film inwards from there.
     """
     before = film[AREA]
-    speed = abs(area - before) / (time * 2.0 * sqrt(pi * area))
+    speed = abs(area - before) / (time * 2.0 * sqrt(pi * area)) if time > 0.0 else inf
     laid = 0.3215 * sphere * (24.0 * foot.viscosity * speed / (pressure * sphere)) ** (2.0 / 3.0)
     if area != before and before > 0.0:
         keep_rim(foot, film, sphere)
@@ -167,8 +183,8 @@ def dry_share(foot: Any, film: Any, sphere: float) -> float:
     if whole < CELLS:
         total += film[FILM + whole] * (inside - whole * foot.cell)
     if rim > 0.0:
-        for place, weight in zip(POINTS, WEIGHTS, strict=True):
-            inwards = place * rim
+        for index in range(len(POINTS)):
+            inwards, weight = POINTS[index] * rim, WEIGHTS[index]
             share = dry(foot, rim_film(film, sphere, inwards))
             total += weight * rim * share * 2.0 * pi * (radius - inwards)
     return total / area

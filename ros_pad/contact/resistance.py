@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 from ros_pad import configuration
 from ros_pad.configuration import Setting, Table, choice, instance, integer, number, quantity
 from ros_pad.contact import laws
-from ros_pad.contact.dome import inflate
+from ros_pad.contact.dome import inflate, press
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, check_criterion, force_limit
 from ros_pad.contact.material import Material, factor_in
@@ -45,6 +45,9 @@ THICK_FILM = 1.0e-3
 
 DOMED = 0.85
 """Typical pressure of domes while walking, as a share of the ceiling."""
+
+SILICONE = 0.3e6
+"""Young's modulus of the sole, Pa, as of soft casting silicones."""
 
 DISC_TURNING_RADIUS = 2.0 / 3.0
 """Radius at which the friction of a turning disc acts, as a share of the disc's radius.
@@ -86,6 +89,7 @@ FOOT_SETTINGS = (
     Setting('shear_stiffness', float, 'Tangential stiffness of the foot.', 'N/m', 1.0, 1e7),
     Setting('chamber_volume', float, 'Air volume without the domes.', 'm³', 0.0, 1e-3),
     Setting('ceiling', float, 'Highest gauge pressure allowed.', 'Pa', 1e3, 1e6),
+    Setting('sole_thickness', 7e-3, 'Thickness of the silicone of the sole.', 'm', 1e-4, 0.1),
     Setting('capillary_force', 0.0, 'Tangential force of the liquid on a dome.', 'N', 0.0, 1.0),
 )
 """The other settings of a foot file."""
@@ -123,6 +127,8 @@ class Foot:
         Volume of air in the foot without the domes, m³.
     ceiling : float
         Highest gauge pressure that may be commanded, Pa.
+    sole_thickness : float
+        Thickness of the silicone of the sole, which gives under load, m.
     limit : str
         Criterion of the force limit, see :mod:`ros_pad.contact.limits`.
     capillary_force : float
@@ -156,6 +162,7 @@ class Foot:
     shear_stiffness: float
     chamber_volume: float
     ceiling: float
+    sole_thickness: float = 7e-3
     limit: str = DEFAULT_CRITERION
     capillary_force: float = 0.0
 
@@ -237,6 +244,26 @@ class Foot:
         """Radius of the free domes, m, at the pressures of :attr:`limits`; at 0 that of a pad."""
         pressures = self.limit_cell * np.arange(1, len(self.limits))
         return self.pad.radius, *inflate(self.pad, pressures).sphere_radius.tolist()
+
+    @cached_property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """Stiffness of all domes, N/m, at the pressures of :attr:`limits`: to half of the limit.
+
+        0 where domes carry nothing.
+        """
+        pressures = self.limit_cell * np.arange(len(self.limits))
+        forces = np.array(self.limits) / (2.0 * self.pads)
+        found = np.zeros(len(pressures))
+        able = forces > 0.0
+        free = inflate(self.pad, pressures[able]).height
+        gaps = press(self.pad, pressures[able], forces[able]).gap
+        found[able] = self.pads * forces[able] / (free - gaps)
+        return tuple(found.tolist())
+
+    @cached_property
+    def sole_stiffness(self) -> float:
+        """Stiffness of the flat sole, N/m: a layer of silicone, free at its sides."""
+        return SILICONE * self.sole_area / self.sole_thickness
 
     def on_rough(self, roughness: float) -> Foot:
         """Return the foot with its constants on a rough floor.

@@ -47,7 +47,7 @@ class SolverSettings:
     timestep: float = 2e-3
     integrator: str = 'implicitfast'
     cone: str = 'elliptic'
-    impratio: float = 100.0
+    impratio: float = 3000.0
 
 
 RECOMMENDED = SolverSettings()

@@ -13,12 +13,20 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.contact import laws
 from ros_pad.contact.film import Film
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.contact.resistance import DOMED
 from ros_pad.records import Array
 from ros_pad.simulation.mujoco_model import POINT
 from ros_pad.simulation.robot import FootState, check_pressures
 from ros_pad.simulation.scene import Scene, Tow
 from ros_pad.simulation.terrain import Floor
+
+LOSS = 0.15
+"""Loss factor of a foot under its expected load, in the motion of that mass; it grows with the
+force. As of casting silicones, assumed.
+"""
 
 LIGHT = 0.05
 """Load, N, below which the friction coefficient no longer changes with the load."""
@@ -44,8 +52,11 @@ class Sole(FootState):
     ----------
     film : Film
         Liquid below it.
-    friction : memoryview
-        MuJoCo's coefficients of its contact.
+    friction, normal, share, tangential : memoryview
+        MuJoCo's coefficients of its contact: friction, spring and damper along the normal, its
+        impedance, and damper along the ground.
+    inverse : float
+        One over the mass that MuJoCo takes its contact to have, 1/kg.
     block : memoryview or None
         Place of the ground below it, m, that moves up and down; None on even ground.
     ratio : float
@@ -56,9 +67,17 @@ class Sole(FootState):
         Whether it left the ground in its present or last swing.
     """
 
-    def __init__(self, film: Film, friction: Any, block: Any) -> None:
+    def __init__(self, film: Film, leg: int, model: Any, block: Any) -> None:
         super().__init__()
-        self.film, self.friction, self.block = film, friction, block
+        pair, body = model.pair(f'foot_{leg}').id, model.geom(f'foot_{leg}').bodyid[0]
+        # Scalars go through a memoryview faster than through an array.
+        self.friction = memoryview(model.pair_friction[pair])
+        self.normal = memoryview(model.pair_solref[pair])
+        self.share = memoryview(model.pair_solimp[pair])
+        self.tangential = memoryview(model.pair_solreffriction[pair])
+        self.tangential[0] = -1e-9
+        self.inverse = float(model.body_invweight0[body, 0])
+        self.film, self.block = film, block
         self.ratio = self.pressure = 0.0
         self.cleared = True
 
@@ -102,8 +121,8 @@ class Soles:
         self._soles = [
             Sole(
                 Film(foot, scene.floor.viscosity),
-                # Scalars go through a memoryview faster than through an array.
-                memoryview(model.pair(f'foot_{leg}').friction),
+                leg,
+                model,
                 None if floor.heights is None else memoryview(data.mocap_pos[index]),
             )
             for index, leg in enumerate(scene.legs)
@@ -117,6 +136,9 @@ class Soles:
         self._felt = data.sensordata.reshape(-1, 6)
         give = 1.0 / foot.shear_stiffness
         self._give = np.array((give, give, 0.0))
+        carried = scene.expected_load / GRAVITY
+        stiffness = laws.between(foot.stiffnesses, DOMED * foot.ceiling / foot.limit_cell)
+        self._loss = LOSS * math.sqrt(stiffness / carried) / GRAVITY
         self.contacts: Array = np.zeros((count, 7))
 
     @property
@@ -161,10 +183,28 @@ class Soles:
         return low
 
     def rub(self) -> None:
-        """Set the friction of each standing foot for the next step, from its load in the last."""
-        for sole, load in zip(self._soles, self._loads.tolist(), strict=True):
+        """Set friction and spring of each foot for the next step, from its load in the last."""
+        loads, heights = self._loads.tolist(), self._places[:, 2].tolist()
+        for sole, load, height in zip(self._soles, loads, heights, strict=True):
             if load > LIGHT:
                 self.press(sole, load, self._dt)
+            ground = sole.block[2] if sole.block is not None else 0.0
+            self._give_way(sole, max(0.0, ground + POINT - height))
+
+    def _give_way(self, sole: Sole, depth: float) -> None:
+        """Set spring and damper of a foot at a depth, m, as an implicit step of them needs.
+
+        MuJoCo's contact has the force D(-b v - k r - a) at a penetration r, speed v and
+        acceleration a. A spring K and a damper c in a step h need D = K h² + c h and b = 1/h.
+        """
+        force, stiffness = laws.spring(self.foot, depth, sole.pressure)
+        dt, damper = self._dt, self._loss * force
+        mass = stiffness * dt * dt + damper * dt
+        share = mass * sole.inverse / (1.0 + mass * sole.inverse)
+        spring = force / depth if depth > 0.0 else stiffness
+        sole.normal[0], sole.normal[1] = -spring / mass * share, -share / dt
+        sole.share[0] = sole.share[1] = share
+        sole.tangential[1] = -share / dt
 
     def press(self, sole: Sole, load: float, drained: float) -> None:
         """Set the friction of a foot with a load, N, whose film has drained for a time, s."""
