@@ -71,9 +71,9 @@ def dispatcher(module: ModuleType) -> tuple[Any, Callable[[Any], Any]]:
         sources = inspect.getsource(laws) + inspect.getsource(planar_step)
         advance, version = step, hashlib.sha256(sources.encode()).hexdigest()
 
-        def step(model: Any, body: Any, feet: Any, pressures: Any) -> bool:
+        def step(model: Any, body: Any, feet: Any, films: Any, pressures: Any) -> bool:
             # A copy from disk is taken only if the values that a function refers to are the same.
-            return advance(model, body, feet, pressures) if version else False
+            return advance(model, body, feet, films, pressures) if version else False
 
     try:
         made = numba.njit(cache=True, error_model='numpy')(step)

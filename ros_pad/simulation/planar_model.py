@@ -30,16 +30,16 @@ PlanarTrunk = namedtuple(
 # dry, wet: drag, N, by the ground
 PlanarTow = namedtuple('PlanarTow', 'mass dry wet distance height stiffness')
 
-# capillary: tangential force of the liquid around all domes, N; dome_drain, sole_drain: factors
-# of the growth of 1/h²; limits: force limits, N, every limit_cell from 0 Pa
+# capillary: tangential force of the liquid around all domes, N; cell, sole_drain: as of a Film;
+# limits, spheres: force limits, N, and radii of domes, m, every limit_cell from 0 Pa
 PlanarFoot = namedtuple(
     'PlanarFoot',
     'friction shear_strength conforming_pressure boundary_friction capillary critical_film'
-    ' film_exponent shear_stiffness turning_radius sole_area dome_drain sole_drain limit_cell'
-    ' limits',
+    ' film_exponent shear_stiffness turning_radius sole_area sole_drain limit_cell limits spheres'
+    ' pads cell viscosity',
 )
 
-# puddle: 1/h² of standing liquid; wet, heights: maps, [row along y][column along x]
+# puddle: depth of standing liquid, m; wet, heights: maps, [row along y][column along x]
 PlanarFloor = namedtuple(
     'PlanarFloor',
     'puddle wet wet_cell wet_x wet_y heights height_cell height_x height_y',
@@ -78,11 +78,12 @@ def model_of(scene: Scene, floor: Floor, period: float) -> PlanarModel:
         foot=_filled(
             PlanarFoot,
             foot,
-            dome_drain=film.dome_drain,
+            cell=film.cell,
+            viscosity=film.viscosity,
             sole_drain=film.sole_drain,
         ),
         floor=PlanarFloor(
-            puddle=floor.film_thickness**-2 if floor.film_thickness > 0.0 else math.inf,
+            puddle=floor.film_thickness,
             wet=floor.wet_map.tolist(),
             wet_cell=floor.cell,
             wet_x=floor.origin[0],

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ros_pad.configuration import instance, number
+from ros_pad.contact import laws
 from ros_pad.errors import NoConvergence
 from ros_pad.records import Array
 from ros_pad.simulation import compiled, planar_step
@@ -98,6 +99,7 @@ class PlanarRobot:
         self.model = model_of(scene, floor, period)
         self.state: Any = [0.0] * planar_step.BODY
         self.table: Any = [[0.0] * len(self.legs) for _ in range(planar_step.FEET)]
+        self._films: Any = [[0.0] * (laws.FILM + laws.CELLS) for _ in self.legs]
         self._plant(scene.legged[1])
         self._step: compiled.Step = planar_step.step
         if compile_steps:
@@ -111,19 +113,18 @@ class PlanarRobot:
             table[planar_step.PHASE][index] = phase
             table[planar_step.OFFSET_X][index] = table[planar_step.LIFTED_X][index] = offset
             if phase < gait.duty:
-                planar_step.touch_down(self.model, self.state, table, index)
+                planar_step.touch_down(self.model, self.state, table, self._films[index], index)
 
     def _compile(self) -> None:
         model = self.model
         self.state, self.table = np.array(self.state), np.array(self.table)
-        floor = model.floor
+        self._films, foot, floor = np.array(self._films), model.foot, model.floor
         self.model = model._replace(
-            foot=model.foot._replace(limits=np.array(model.foot.limits)),
+            foot=foot._replace(limits=np.array(foot.limits), spheres=np.array(foot.spheres)),
             floor=floor._replace(wet=np.array(floor.wet), heights=np.array(floor.heights)),
         )
-        self._step = compiled.step(
-            planar_step, self.model, self.state, self.table, (0.0,) * len(self.legs)
-        )
+        given = self.model, self.state, self.table, self._films, (0.0,) * len(self.legs)
+        self._step = compiled.step(planar_step, *given)
 
     @property
     def body(self) -> Vector:
@@ -147,7 +148,7 @@ class PlanarRobot:
             When the friction step does not converge.
         """
         check_pressures(pressures, len(self.legs))
-        if not self._step(self.model, self.state, self.table, tuple(pressures)):
+        if not self._step(self.model, self.state, self.table, self._films, tuple(pressures)):
             raise NoConvergence(
                 f'friction step of {self.period:g} s does not converge: shorten the period, or'
                 ' lower shear_stiffness of the foot'

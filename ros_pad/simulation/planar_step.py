@@ -10,9 +10,10 @@ operations that plain and compiled code round in the same way (``sqrt``, but no 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, inf, pi, sin, sqrt
+from math import cos, pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
+from ros_pad.contact import laws
 from ros_pad.contact.laws import dome_load, drained, resistance
 
 if TYPE_CHECKING:
@@ -28,14 +29,12 @@ Three = tuple[float, float, float]
 Leg = tuple[int, float, float, float, float]  # index, share, x, y, preload
 
 # Rows of the table of feet; a column is a foot. Values are in world axes unless noted.
-FEET = 27
+FEET = 23
 (
     PHASE,  # time since touch-down, as a share of the cycle
     OFFSET_X, OFFSET_Y,  # from home, in the body, m
     LIFTED_X, LIFTED_Y,  # place of the lift-off, from home, in the body, m
     GROUND, HEIGHT,  # height of the ground below the foot, and of the foot above it, m
-    FRESH, DOME_FILM, SOLE_FILM,  # 1/h² of the film at touch-down, under domes, under sole, 1/m²
-    DOME_AREA,  # contact area of the domes, m²
     LOAD, CAP,  # load and tangential capacity, N
     SHEAR_X, SHEAR_Y, SHEAR_TURN,  # shear of the pads, m and rad
     FORCE_X, FORCE_Y, MOMENT,  # force of the ground on the foot, N, and yaw moment, N m
@@ -58,19 +57,22 @@ BODY = 16
 ) = range(BODY)  # fmt: skip
 
 
-def step(model: PlanarModel, body: Any, feet: Any, pressures: Floats) -> bool:
-    """Advance by a period; return False if the friction step did not converge."""
+def step(model: PlanarModel, body: Any, feet: Any, films: Any, pressures: Floats) -> bool:
+    """Advance by a period; return False if the friction step did not converge.
+
+    ``films`` has a row for each foot, see :mod:`ros_pad.contact.laws`.
+    """
     dt = model.period
     # The gait has its own clock, which starts when the robot has settled.
     before = max(0.0, body[STEPS] * dt - model.settle)
     body[STEPS] += 1.0
     time = max(0.0, body[STEPS] * dt - model.settle)
-    move_feet(model, body, feet, before, time)
+    move_feet(model, body, feet, films, before, time)
     share_loads(model, body, feet)
     # Lever arms and motions are turned into world axes with the heading in mid-step.
     middle = body[HEADING] + 0.5 * body[YAW_RATE] * dt
     cosine, sine = cos(middle), sin(middle)
-    contacts = grip(model, body, feet, pressures, cosine, sine)
+    contacts = grip(model, body, feet, films, pressures, cosine, sine)
     towed = model.tow.mass
     cap = 0.0
     if towed > 0.0:
@@ -109,7 +111,9 @@ def step(model: PlanarModel, body: Any, feet: Any, pressures: Floats) -> bool:
 # --- gait -------------------------------------------------------------------------------------
 
 
-def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: float) -> None:
+def move_feet(
+    model: PlanarModel, body: Any, feet: Any, films: Any, before: float, time: float
+) -> None:
     """Move the feet in the body as the gait prescribes, between two times of the gait, s."""
     gait, trunk = model.gait, model.trunk
     cycle, duty, reach = gait.cycle, gait.duty, gait.reach
@@ -126,7 +130,7 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
         phases[index] = phase
         if phase < duty:
             if not stood:
-                touch_down(model, body, feet, index)
+                touch_down(model, body, feet, films[index], index)
             # The foot moves in the body against the motion of the body.
             heights[index] = 0.0
             step_x[index] = turn * (trunk.home_y[index] + y) - advance
@@ -168,16 +172,14 @@ def load_share(duty: float, overlap: float, phase: float) -> float:
     return ramp * ramp * (3.0 - 2.0 * ramp)
 
 
-def touch_down(model: PlanarModel, body: Any, feet: Any, index: int) -> None:
+def touch_down(model: PlanarModel, body: Any, feet: Any, film: Any, index: int) -> None:
     """Start a stance: read the depth of the liquid and the height of the ground at the foot."""
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     home_x = model.trunk.home_x[index] + feet[OFFSET_X][index]
     home_y = model.trunk.home_y[index] + feet[OFFSET_Y][index]
     x = body[X] + cosine * home_x - sine * home_y
     y = body[Y] + sine * home_x + cosine * home_y
-    fresh = model.floor.puddle if is_wet(model, x, y) else inf
-    feet[FRESH][index] = feet[DOME_FILM][index] = feet[SOLE_FILM][index] = fresh
-    feet[DOME_AREA][index] = 0.0
+    laws.touch_down(film, model.floor.puddle if is_wet(model, x, y) else 0.0)
     heights, cell = model.floor.heights, model.floor.height_cell
     row = heights[int((y - model.floor.height_y) // cell) % len(heights)]
     feet[GROUND][index] = row[int((x - model.floor.height_x) // cell) % len(row)]
@@ -299,7 +301,13 @@ def balance(legs: Sequence[Leg], presses: int, wanted: Three, rocks: float, load
 
 
 def grip(
-    model: PlanarModel, body: Any, feet: Any, pressures: Floats, cosine: float, sine: float
+    model: PlanarModel,
+    body: Any,
+    feet: Any,
+    films: Any,
+    pressures: Floats,
+    cosine: float,
+    sine: float,
 ) -> list[Pushed]:
     """Set the tangential capacity of each foot, N; return the contacts of feet that have one.
 
@@ -322,16 +330,9 @@ def grip(
         feet[WET][index] = 0.0
         if is_wet(model, body[X] + x, body[Y] + y):
             feet[WET][index] = 1.0
-            state = feet[DOME_AREA][index], feet[DOME_FILM][index], feet[SOLE_FILM][index]
-            area, domes, sole = drained(
-                model.foot, feet[FRESH][index], state, on_domes, load - on_domes, pressure, dt
+            dome_film, sole_film = drained(
+                model.foot, films[index], on_domes, load - on_domes, pressure, dt
             )
-            feet[DOME_AREA][index], feet[DOME_FILM][index], feet[SOLE_FILM][index] = (
-                area,
-                domes,
-                sole,
-            )
-            dome_film, sole_film = domes**-0.5, sole**-0.5
         cap = resistance(model.foot, on_domes, load - on_domes, pressure, dome_film, sole_film)
         feet[CAP][index] = cap
         if pressure > 0.0 and on_domes < load:

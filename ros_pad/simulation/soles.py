@@ -71,10 +71,10 @@ class Sole(FootState):
         super().__init__()
         pair, body = model.pair(f'foot_{leg}').id, model.geom(f'foot_{leg}').bodyid[0]
         # Scalars go through a memoryview faster than through an array.
-        self.friction = memoryview(model.pair_friction[pair])
-        self.normal = memoryview(model.pair_solref[pair])
-        self.share = memoryview(model.pair_solimp[pair])
-        self.tangential = memoryview(model.pair_solreffriction[pair])
+        self.friction: Any = memoryview(model.pair_friction[pair])
+        self.normal: Any = memoryview(model.pair_solref[pair])
+        self.share: Any = memoryview(model.pair_solimp[pair])
+        self.tangential: Any = memoryview(model.pair_solreffriction[pair])
         self.tangential[0] = -1e-9
         self.inverse = float(model.body_invweight0[body, 0])
         self.film, self.block = film, block
