@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ros_pad.contact import laws
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation import Scene, compiled, planar_step
 from ros_pad.simulation.gait import WalkingGait
@@ -21,6 +22,10 @@ MODEL = model_of(SCENE, FLOOR, 0.004)
 UNEVEN = FLOOR.uneven(2e-3, 1)
 BUMPY = model_of(SCENE, UNEVEN, 0.004)
 LEGS = (1, 2, 3, 4, 5, 6)
+
+
+def films():
+    return [[0.0] * (laws.FILM + laws.CELLS) for _ in LEGS]
 
 
 def table():
@@ -44,7 +49,7 @@ def test_gait(time, cycle, duty, stride):
         )
     )
     feet, body = table(), [0.0] * planar_step.BODY
-    planar_step.move_feet(own, body, feet, time, time)
+    planar_step.move_feet(own, body, feet, films(), time, time)
     for index, leg in enumerate(LEGS):
         phase = gait.phase(leg - 1, time)
         assert feet[planar_step.PHASE][index] == phase
@@ -61,7 +66,7 @@ def test_floor(x, y):
     assert planar_step.is_wet(BUMPY, x, y) == UNEVEN.wet(x, y)
     feet, body = table(), [0.0] * planar_step.BODY
     body[planar_step.X], body[planar_step.Y] = x, y
-    planar_step.touch_down(BUMPY, body, feet, 4)
+    planar_step.touch_down(BUMPY, body, feet, films()[4], 4)
     home_x, home_y = SCENE.body.homes[4]
     assert feet[planar_step.GROUND][4] == UNEVEN.height(x + home_x, y + home_y)
 
