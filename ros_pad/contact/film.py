@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 WATER_VISCOSITY = 1.0e-3  # Pa s, at 20 degC
 
+LANDING = 7e-3
+"""Time in which half of the load of a foot comes, s: on L2, domes of the hexapod take 5.8 ms from
+10 to 90 % of their first peak."""
+
 
 def film_thickness(
     initial: ArrayLike,
@@ -165,3 +169,14 @@ class Film:
             dry contact.
         """
         return laws.drained(self, self._state, dome_load, sole_load, pressure, duration)
+
+    def stand(
+        self, dome_load: float, sole_load: float, pressure: float, time: float
+    ) -> tuple[float, float]:
+        """Stand for a time, s, as feet do: half of the load lands, the rest comes evenly.
+
+        Parameters and result are those of :meth:`drain`; the loads are those at the end.
+        """
+        landing = min(LANDING, 0.5 * time)
+        self.drain(0.5 * dome_load, 0.5 * sole_load, pressure, landing)
+        return self.drain(dome_load, sole_load, pressure, time - landing)

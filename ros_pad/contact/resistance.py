@@ -364,6 +364,15 @@ class Foot:
             films = film.drain(on_domes, on_sole, pressure, duration)
         return laws.resistance(self, on_domes, on_sole, pressure, *films)
 
+    def grip_after(self, load: float, pressure: float, film: Film, time: float) -> float:
+        """Return the tangential resistance, N, after a time in stance on a film, s.
+
+        The film has just been touched; for speed the input is not checked.
+        """
+        on_domes = self.dome_load(load, pressure)
+        films = film.stand(on_domes, load - on_domes, pressure, time)
+        return laws.resistance(self, on_domes, load - on_domes, pressure, *films)
+
 
 @functools.lru_cache(maxsize=64)
 def _limits(pad: Pad, ceiling: float, cells: int, criterion: str) -> tuple[float, ...]:

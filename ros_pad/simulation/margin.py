@@ -124,10 +124,10 @@ class Stand:
         self.on_sole = scene.expected_load - self.on_domes
 
     def films(self, time: float) -> tuple[float, float]:
-        """Return the films under domes and sole after a time, s, by Stefan and Reynolds, m."""
+        """Return the films under domes and sole after a time in stance, s, in m."""
         film = Film(self.foot, self.floor.viscosity)
         film.touch_down(self.floor.film_thickness)
-        return film.drain(self.on_domes, self.on_sole, self.pressure, time)
+        return film.stand(self.on_domes, self.on_sole, self.pressure, time)
 
     def resistance(self, dome_film: float, sole_film: float) -> float:
         """Return the tangential resistance, N, on films under domes and sole, m."""
