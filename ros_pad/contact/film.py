@@ -82,11 +82,11 @@ def film_thickness(
 class Film:
     """The liquid film under one foot during one stance: under its domes and under its flat sole.
 
-    The film drains while the foot stands. When the foot slips, the film is assumed to move with
-    it, without new liquid (docs/assumptions.md). The flat sole is a rigid disc. Under a dome, a
-    contact that grows lays the thicker a film the faster it grows, and the rim of a contact that
-    rests levels it from the edge inwards: how much of a dome is dry follows from how its load has
-    come (:mod:`ros_pad.contact.laws`).
+    The film drains while the foot stands. The flat sole is a rigid disc, whose film moves with it
+    when it slips (docs/assumptions.md). Under a dome, a contact that grows lays the thicker a film
+    the faster it grows, the rim of a contact that rests levels it from the edge inwards, and slip
+    drags in a film of its own: how much of a dome is dry follows from how its load has come
+    (:mod:`ros_pad.contact.laws`).
 
     Parameters
     ----------
@@ -148,7 +148,12 @@ class Film:
         laws.touch_down(self._state, number('thickness', thickness, 'm'))
 
     def drain(
-        self, dome_load: float, sole_load: float, pressure: float, duration: float
+        self,
+        dome_load: float,
+        sole_load: float,
+        pressure: float,
+        duration: float,
+        slip: float = 0.0,
     ) -> tuple[float, float]:
         """Drain under the loads of domes and flat sole; for speed the input is not checked.
 
@@ -160,7 +165,9 @@ class Film:
         pressure : float
             Gauge pressure in the pads, Pa; above 0 if the domes carry load.
         duration : float
-            Time, s, above 0.
+            Time, s, from 0.
+        slip : float
+            Speed at which the foot slips, m/s, from 0.
 
         Returns
         -------
@@ -168,7 +175,7 @@ class Film:
             Thickness of the film under domes and flat sole, m: of an even film that leaves as much
             dry contact.
         """
-        return laws.drained(self, self._state, dome_load, sole_load, pressure, duration)
+        return laws.drained(self, self._state, dome_load, sole_load, pressure, duration, slip)
 
     def stand(
         self, dome_load: float, sole_load: float, pressure: float, time: float

@@ -343,7 +343,12 @@ class Foot:
         return laws.dome_load(self, load, pressure)
 
     def grip(
-        self, load: float, pressure: float, film: Film | None = None, duration: float = 0.0
+        self,
+        load: float,
+        pressure: float,
+        film: Film | None = None,
+        duration: float = 0.0,
+        slip: float = 0.0,
     ) -> float:
         """Return the tangential resistance, N; for speed the input is not checked.
 
@@ -357,11 +362,13 @@ class Foot:
             Film on which the foot stands; by default the ground is dry.
         duration : float
             Time for which the film drains before, s, from 0.
+        slip : float
+            Speed at which the foot slips in it, m/s.
         """
         on_domes = self.dome_load(load, pressure)
         on_sole, films = load - on_domes, (0.0, 0.0)
         if film is not None:
-            films = film.drain(on_domes, on_sole, pressure, duration)
+            films = film.drain(on_domes, on_sole, pressure, duration, slip)
         return laws.resistance(self, on_domes, on_sole, pressure, *films)
 
     def grip_after(self, load: float, pressure: float, film: Film, time: float) -> float:

@@ -44,7 +44,7 @@ class SolverSettings:
         friction limit creeps at a speed proportional to 1/impratio; shorter steps do not help.
     """
 
-    timestep: float = 2e-3
+    timestep: float = 1e-3
     integrator: str = 'implicitfast'
     cone: str = 'elliptic'
     impratio: float = 3000.0

@@ -331,7 +331,13 @@ def grip(
         if is_wet(model, body[X] + x, body[Y] + y):
             feet[WET][index] = 1.0
             dome_film, sole_film = drained(
-                model.foot, films[index], on_domes, load - on_domes, pressure, dt
+                model.foot,
+                films[index],
+                on_domes,
+                load - on_domes,
+                pressure,
+                dt,
+                feet[SLIP_SPEED][index],
             )
         cap = resistance(model.foot, on_domes, load - on_domes, pressure, dome_film, sole_film)
         feet[CAP][index] = cap

@@ -125,7 +125,8 @@ class RailLeg:
         if stands:
             load, pressure = body.load, pressures[0]
             state.wet = self._floor.wet(self._x + offset, 0.0)
-            cap = foot.grip(load, pressure, self._film if state.wet else None, dt)
+            film = self._film if state.wet else None
+            cap = foot.grip(load, pressure, film, dt, state.slip_speed)
             if pressure > 0.0 and foot.dome_load(load, pressure) < load:
                 state.overload_time += dt
         free = self.speed - GRAVITY * math.sin(self._scene.floor.slope) * dt

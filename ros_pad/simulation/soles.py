@@ -209,7 +209,8 @@ class Soles:
     def press(self, sole: Sole, load: float, drained: float) -> None:
         """Set the friction of a foot with a load, N, whose film has drained for a time, s."""
         film = sole.film if sole.wet else None
-        sole.ratio = ratio = self.foot.grip(load, sole.pressure, film, drained) / load
+        grip = self.foot.grip(load, sole.pressure, film, drained, sole.slip_speed)
+        sole.ratio = ratio = grip / load
         row = sole.friction
         # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.
         row[0] = row[1] = ratio

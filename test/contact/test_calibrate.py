@@ -66,7 +66,7 @@ def slips_of(foot, rows, noise=0.0, seed=0):
             film = Film(foot, VISCOSITY)
             film.touch_down(FILM)
             domes = foot.dome_load(load, pressure)
-            films = film.drain(domes, load - domes, pressure, stance_time)
+            films = film.stand(domes, load - domes, pressure, stance_time)
         forces.append(tangential_resistance(foot, load, pressure, *films))
     pressure, load, wet, stance_time = (np.array(column) for column in zip(*rows, strict=True))
     noisy = np.array(forces) * (

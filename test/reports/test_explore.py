@@ -56,7 +56,7 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness):
             film = Film(foot)
             film.touch_down(3e-4)
             on_domes = foot.dome_load(13.0, pressure)
-            films = film.drain(on_domes, 13.0 - on_domes, pressure, 0.3)
+            films = film.stand(on_domes, 13.0 - on_domes, pressure, 0.3)
         value = tangential_resistance(foot, 13.0, pressure, *films)
         assert found.grip[state] == pytest.approx(value, rel=1e-12)
     above = next(each for each in found.remarks if each.name == 'load')
