@@ -65,6 +65,15 @@ def scene_of(urdf: str, feet: Sequence[str], case: str, cycles: int) -> Scene:
         return Scene.load(file)
 
 
+def robots_of(file: pathlib.Path | None) -> dict[str, list[str]]:
+    """Return URDF and feet of the shipped go2, and of the robots in a file."""
+    robots = {'shipped go2': ['go2']}
+    if file:
+        for name, (urdf, *feet) in yaml.safe_load(file.read_text()).items():
+            robots[name] = [str(file.parent / urdf), *feet]
+    return robots
+
+
 def walk(scene: Scene, robot: FullRobot, push: float, seed: int) -> Iterator[None]:
     """Walk until the end or a verdict; yield after each step.
 
@@ -143,10 +152,7 @@ def main(words: Sequence[str] | None = None) -> int:
     command.add_processes(part)
     command.add_out(part)
     args = part.parse_args(words)
-    robots = {'shipped go2': ['go2']}
-    if args.robots:
-        for name, (urdf, *feet) in yaml.safe_load(args.robots.read_text()).items():
-            robots[name] = [str(args.robots.parent / urdf), *feet]
+    robots = robots_of(args.robots)
     cases = [
         (name, row[0], row[1:], case, args.cycles, args.first + seed)
         for case in args.cases
