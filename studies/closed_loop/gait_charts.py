@@ -31,7 +31,7 @@ from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import RECOMMENDED
 from studies import command
 from studies.closed_loop.gaits import PERIOD, robots_of, scene_of, walk
-from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PURPLE, SKY, STYLE, VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
 from studies.samples import runs
 
 SOURCE = 'quad_dry.npz: a Go2-like quadruped simulated outside this project in MuJoCo'
@@ -131,10 +131,8 @@ def measure_cycle(args: argparse.Namespace) -> dict[str, Any]:
 def draw_cycle(document: Mapping[str, Any]) -> Figure:
     """Return the picture of the two pushed walks."""
     figure = Figure(figsize=(9.0, 5.2), layout='constrained')
-    layout: Any = [
-        [name for name in names for _ in range(12 // len(names))] for names in (BODY, LEGS)
-    ]
-    for name, panel in figure.subplot_mosaic(layout).items():
+    panels = figure.subplot_mosaic('aaaabbbbcccc;dddeeefffggg').values()
+    for name, panel in zip((*BODY, *LEGS), panels, strict=True):
         scale, label = BODY.get(name, (1.0, f'load of {name} over the weight'))
         for of, colour, line in ((OTHER, VERMILION, '--'), ('go2, pushed', BLUE, '-')):
             mean, low, high = scale * np.array(document['curves'][of][name])
@@ -192,32 +190,22 @@ def measure_steps(args: argparse.Namespace) -> dict[str, Any]:
 def draw_steps(document: Mapping[str, Any]) -> Figure:
     """Return the picture: time against errors, a line for each step of control."""
     figure = Figure(figsize=(9.0, 6.0), layout='constrained')
-    shipped = 1e3 * PERIOD, 1e3 * RECOMMENDED.timestep
-    (ring,) = (
-        row for row in document['rows'] if (row['control_ms'], row['physics_ms']) == shipped
-    )
+    at = {(row['control_ms'], row['physics_ms']): row for row in document['rows']}
+    shipped = at[1e3 * PERIOD, 1e3 * RECOMMENDED.timestep]
     panels = zip(figure.subplots(2, 2).ravel(), ERRORS.items(), strict=True)
     for panel, (name, (scale, title)) in panels:
         for control, marker in CONTROLS.items():
             rows = [row for row in document['rows'] if row['control_ms'] == control]
-            fell, count = (sum(row[key] for row in rows) for key in ('falls', 'walks'))
-            label = f'{control} ms' + f': falls {fell} times of {count}' * bool(fell)
+            falls, count = (sum(row[key] for row in rows) for key in ('falls', 'walks'))
+            label = f'{control} ms' + f': falls {falls} times of {count}' * bool(falls)
             x = [1e3 * row['cost'] for row in rows]
             y = [scale * row.get(name, math.nan) for row in rows]
-            look = {
-                'marker': marker,
-                'color': COLOURS[control],
-                'ms': 7,
-                'mec': 'white',
-                'mew': 0.5,
-            }
-            panel.plot(x, y, lw=1.0, label=label, **look)
-        panel.plot(1e3 * ring['cost'], scale * ring[name], 'o', ms=14, mfc='none', mec=BLACK)
+            panel.plot(x, y, f'{marker}-', color=COLOURS[control], lw=1.0, label=label)
+        ring = 1e3 * shipped['cost'], scale * shipped[name]
+        panel.plot(*ring, 'o', ms=14, mfc='none', mec=BLACK)
         panel.set(title=title, xscale='log', xlabel='processor time of a simulated second, ms')
         panel.set_ylim(bottom=0.0)
         panel.set_xticks((10, 20, 50, 100), ('10', '20', '50', '100'))
-        panel.minorticks_off()
-        panel.grid(color=PALE, alpha=0.25, lw=0.5)
     title = 'Step of control; on its line steps of physics, the right end 0.25 ms; ring: shipped'
     handles = figure.axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc='outside upper center', ncols=3, title=title)
@@ -227,17 +215,14 @@ def draw_steps(document: Mapping[str, Any]) -> Figure:
 # --- falls ---------------------------------------------------------------------------------------
 
 
-def fell(
-    robot: Sequence[str], kind: str, value: float, push: float, seed: int, cycles: int
-) -> bool:
+def fell(robot: Sequence[str], kind: str, at: float, push: float, seed: int, cycles: int) -> bool:
     """Walk with a friction or on a slope; return whether the walk ended with a verdict."""
     scene = _scene(robot[0], tuple(robot[1:]), cycles)
-    friction, slope = (0.8, math.radians(value)) if kind == 'slope' else (value, 0.0)
+    friction, slope = (0.8, math.radians(at)) if kind == 'slope' else (at, 0.0)
     foot = replace(scene.foot, friction=friction, shear_strength=0.0)
     scene = replace(scene, foot=foot, floor=replace(scene.floor, slope=slope))
     walker = FullRobot(scene, scene.floor.build(seed), PERIOD)
-    for _ in walk(scene, walker, push, seed):
-        pass
+    list(walk(scene, walker, push, seed))
     return walker.verdict is not None
 
 
@@ -263,20 +248,19 @@ def measure_falls(args: argparse.Namespace) -> dict[str, Any]:
 def draw_falls(document: Mapping[str, Any]) -> Figure:
     """Return the maps, a row for each robot."""
     names = list(dict.fromkeys(row['robot'] for row in document['rows']))
+    most = document['rows'][0]['walks']
     figure = Figure(figsize=(9.0, 0.4 + 3.0 * len(names)), layout='constrained')
     places = [(name, kind) for name in names for kind in MAPS]
     for panel, place in zip(figure.subplots(len(names), 2).ravel(), places, strict=True):
         rows = [row for row in document['rows'] if (row['robot'], row['map']) == place]
         falls = np.array([list(row['falls'].values()) for row in rows])
-        panel.imshow(
-            falls, 'Oranges', vmin=0, vmax=rows[0]['walks'], origin='lower', aspect='auto'
-        )
+        panel.imshow(falls, 'Oranges', vmin=0, vmax=1.7 * most, origin='lower', aspect='auto')
         for (y, x), count in np.ndenumerate(falls):
             panel.text(x, y, count or '·', ha='center', va='center')
         panel.set_xticks(range(falls.shape[1]), rows[0]['falls'])
         panel.set_yticks(range(len(rows)), [f'{100 * row["push"]:g} %' for row in rows])
         panel.set(title=place[0], xlabel=MAPS[place[1]][0], ylabel='push over weight')
-    figure.suptitle(f'Falls of {rows[0]["walks"]} walks, {document["cycles"]} cycles long')
+    figure.suptitle(f'Falls of {most} walks of {document["cycles"]} cycles')
     return figure
 
 
