@@ -294,12 +294,11 @@ faults:
 
 
 def test_a_robot_from_urdf_without_markers(tmp_path):
-    text = configuration.locate('scenes', 'quadruped_patches').read_text()
     urdf = pathlib.Path(__file__).resolve().parents[2] / 'bags' / 'quadruped' / 'robot.urdf'
-    feet = 'feet: [FL_foot, FR_foot, RL_foot, RR_foot]'
-    mine = tmp_path / 'mine.yaml'
-    mine.write_text(text.replace('robot: go2', f'robot: {urdf}\n{feet}'))
-    scene = dataclasses.replace(Scene.load(mine), cycles=1)
+    named = f'robot: {urdf}\nfeet: [FL_foot, FR_foot, RL_foot, RR_foot]'
+    text = configuration.locate('scenes', 'quadruped_patches').read_text()
+    (tmp_path / 'mine.yaml').write_text(text.replace('robot: go2', named))
+    scene = dataclasses.replace(Scene.load(tmp_path / 'mine.yaml'), cycles=1)
     on_nodes = composed.run(scene, 'flat', seed=1, bag=tmp_path / 'bag', sensing='joints')
     without = trials.run(scene, 'flat', seed=1, sensing='joints')
     assert len(on_nodes.odom) > 360  # the last control period is not whole
