@@ -144,7 +144,7 @@ def main(words: Sequence[str] | None = None) -> int:
     part.add_argument('--cases', nargs='+', choices=CASES, default=list(CASES), metavar='CASE')
     command.add_count(part, '--cycles', 40, 'gait cycles of a walk')
     command.add_count(part, '--seeds', 3, 'walks of each case')
-    command.add_count(part, '--first', 501, 'first seed', least=0)
+    command.add_count(part, '--first', 601, 'first seed', least=0)
     command.add_processes(part)
     command.add_out(part)
     args = part.parse_args(words)
