@@ -117,6 +117,8 @@ def nodes(context: LaunchContext) -> list[Node]:
     legs = {'legs': list(walked.legs)} if walked else {}
     foot = {'foot': walked.foot.source, 'expected_load': walked.expected_load} if walked else {}
     robot = {'robot': walked.body.robot.source, 'foot_radius': 0.0} if walked and joints else {}
+    if robot.get('robot', '').endswith('.urdf'):
+        robot['feet'] = ','.join(walked.body.robot.legs)
     # The recorder first and the simulator last: a walk is recorded from its first step on.
     chosen = []
     if flag('record'):

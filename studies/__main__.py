@@ -33,6 +33,7 @@ STUDIES = {
     ),
     'gaits': ('closed_loop.gaits', 'quadrupeds from their URDF files alone (5 min)'),
     'forces': ('work_precision.forces', 'forces of feet within their cones (2 min)'),
+    'gait_charts': ('closed_loop.gait_charts', 'a cycle, steps and falls of such a gait (10 min)'),
     'faults': ('closed_loop.faults', 'a walk with faults, with and without monitor (8 min)'),
     'joints': ('closed_loop.joints', 'walks without markers, beside those with them (10 min)'),
     'labelled_contacts': ('closed_loop.labelled_contacts', 'slip alarm on recorded contacts'),

@@ -80,28 +80,49 @@ def test_own_foot(tmp_path, monkeypatch, capsys):
 
 
 def test_own_robot(tmp_path, monkeypatch, capsys):
+    pytest.importorskip('mujoco')
     page = TUTORIALS / 'own_robot.md'
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('COLUMNS', '98')
     (tmp_path / 'bags').symlink_to(ROOT / 'bags')
     loading, estimating = blocks(page, 'python')
-    (mapping,) = blocks(page, 'yaml')
+    scene, mapping = blocks(page, 'yaml')
+    (tmp_path / 'my_scene.yaml').write_text(scene, encoding='utf-8')
     (tmp_path / 'my_mapping.yaml').write_text(mapping, encoding='utf-8')
-    exec(compile(loading, str(page), 'exec'), {})
-    shown(capsys.readouterr().out, page, "('FL_hip_joint'")
-    with_faults, mended = (words[1:] for words in commands(page) if words[1] == 'doctor')
-    expected = [each for each in blocks(page) if each.startswith('ok       robot')]
-    for words, status, block in zip((with_faults, mended), (1, 0), expected, strict=True):
-        assert cli.main(words) == status
-        lines = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
-        for line in block.splitlines():
-            beginning = line.removesuffix('...').rstrip()
-            assert any(each.startswith(beginning) for each in lines), line
-    exec(compile(estimating, str(page), 'exec'), {})
+    names = {}
+    exec(compile(loading, str(page), 'exec'), names)
+    shown(capsys.readouterr().out, page, '15.02 kg')
+    (words,) = (words[1:] for words in commands(page) if words[1] == 'run')
+    assert cli.main([*words, '--no-ros']) == 0
+    shown(capsys.readouterr().out, page, 'my_scene, seed 0')
+    assert 'pad run my_scene.yaml' in next(tmp_path.glob('runs/*/report.html')).read_text('utf-8')
+    (words,) = (words[1:] for words in commands(page) if words[1] == 'doctor')
+    assert cli.main(words) == 1
+    shown(capsys.readouterr().out, page, 'ok       robot')
+    assert cli.main([*words, '--mapping', 'my_mapping.yaml']) == 0
+    shown(capsys.readouterr().out, page, 'ok       sensors')
+    exec(compile(estimating, str(page), 'exec'), names)
     distance, doubts = capsys.readouterr().out.strip().split(' m ')
     # The simulation's true distance, from the log of which the bag was made.
     assert float(distance) == pytest.approx(1.564, rel=0.03)
     assert doubts == "['']"
+
+
+def test_refusals_of_own_robots(tmp_path, capsys):
+    """What the table on the page says; its third row changes the URDF."""
+    pytest.importorskip('mujoco')
+    page = TUTORIALS / 'own_robot.md'
+    scene = yaml.safe_load(blocks(page, 'yaml')[0]) | {'robot': 'robot.urdf'}
+    urdf = (ROOT / 'bags' / 'quadruped' / 'robot.urdf').read_text('utf-8')
+    rows = re.findall(r'^\| `(.*?)`.* \| `(.*)` \|$', page.read_text('utf-8'), re.MULTILINE)
+    assert len(rows) == 4
+    for written, read in rows:
+        changes = {} if '=' in written else yaml.safe_load(written)
+        odd = re.sub('effort="40"', written, urdf) if '=' in written else urdf
+        (tmp_path / 'robot.urdf').write_text(odd)
+        (tmp_path / 'mine.yaml').write_text(yaml.safe_dump(scene | changes))
+        assert cli.main(['run', str(tmp_path / 'mine.yaml'), '--no-ros']) != 0
+        assert read in capsys.readouterr().err
 
 
 def test_the_example_of_a_mapping(tmp_path):

@@ -127,9 +127,11 @@ class ComposedTrial:
             self.body_estimator = None
             if sensing == 'joints':
                 assert isinstance(scene.body, LeggedBody)
+                model = scene.body.robot
                 # The soles of simulated robots are on ankles.
-                own = {'robot': scene.body.robot.source, 'foot_radius': 0.0}
-                own |= body_settings_for(scene)
+                own = {'robot': model.source, 'foot_radius': 0.0} | body_settings_for(scene)
+                if model.source.endswith('.urdf'):
+                    own['feet'] = ','.join(map(str, model.legs))
                 self.body_estimator = self._add(BodyEstimatorNode, **timed, **own)
             self.estimator = self._add(EstimatorNode, **tuning.values, **loaded)
             own = {'policy': policy, 'dome_pressure': scene.dome_pressure or 0.0}

@@ -46,7 +46,8 @@ def crouch(legs: Sequence[Sequence[Joint]], feet: Array) -> Array:
 
 def _bent(leg: Sequence[Joint], foot: Array) -> Array:
     chains = Chains([leg], foot[None])
-    low, high = np.clip(np.array([joint.limits for joint in leg]).T, -_WIDEST, _WIDEST)
+    limits = np.array([joint.limits for joint in leg])
+    low, high = np.clip(limits.T, -_WIDEST, _WIDEST)
     count = max(3, round(_TRIES ** (1.0 / max(len(leg) - 1, 1))))
     grids = [np.clip([0.0], low[0], high[0])]
     grids += [np.linspace(*ends, count) for ends in zip(low[1:], high[1:], strict=True)]
@@ -60,6 +61,9 @@ def _bent(leg: Sequence[Joint], foot: Array) -> Array:
     score = moves - 0.5 * torque - 1e-3 * joints[..., 0].sum(1)
     below = joints[..., 2].min(1) - found.positions[:, 0, 2]
     score[below < 0.1 * length] = -math.inf  # the foot is to be the lowest part
+    room = 0.15 * np.diff(limits[1:])  # to lift the foot
+    near = (tries[:, 0, 1:, None] - limits[1:]) * (1.0, -1.0) < room
+    score[near.any((1, 2)) & (score > -math.inf)] -= 10.0 * length
     return np.asarray(tries[int(score.argmax()), 0])
 
 

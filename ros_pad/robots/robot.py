@@ -175,7 +175,7 @@ class Robot:
         if path.endswith('.urdf'):
             return _from_urdf(path, feet, imu)._loaded(path, foot_radius)
         if feet or imu:
-            raise InvalidInput('feet and imu are for URDF files; a YAML file has its own')
+            raise InvalidInput('feet and imu are for files that end in .urdf; YAML has its own')
         found = configuration.locate('robots', path)
         return _from_table(Table.load(found), found)._loaded(path, foot_radius)
 

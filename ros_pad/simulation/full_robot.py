@@ -87,9 +87,10 @@ class FullRobot:
     Raises
     ------
     ConfigError
-        When the robot has no servos, when its legs cannot walk the scene's gait or have more
-        inertia than the scene's body, when the towed load is too light for so stiff a line, or
-        when MuJoCo is missing.
+        When its legs cannot walk the scene's gait or have more inertia than the scene's body; when
+        its motors are too weak to stand, its samples too slow, or the towed load beyond its grip,
+        if its joints take torques; when the load is too light for so stiff a line; or when MuJoCo
+        is missing.
     InvalidInput
         When the period is not finite and above 0.
 
@@ -111,6 +112,9 @@ class FullRobot:
         body, _ = scene.legged
         robot = body.robot
         number('period', period, 's', above=True)
+        if not robot.servo:
+            check_strength(scene)
+            check_tow(scene)
         solver = check_reach(scene)
         self.legs = scene.legs
         self.joint_names = robot.joint_names
@@ -131,8 +135,6 @@ class FullRobot:
         if robot.servo:
             self._drive = Servos(scene, solver, period, self.data.ctrl)
         else:
-            check_strength(scene)
-            check_tow(scene)
             self._drive = Balance(scene, period, mujoco, self.model, self.data)
         self.soles = Soles(scene, floor, period, dt, self.model, self.data)
         self._sled = Sled(scene.tow, floor, self.model, self.data) if scene.tow.weight else None

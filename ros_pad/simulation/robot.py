@@ -174,9 +174,23 @@ def check_reach(scene: Scene) -> FeetSolver:
 
 
 def check_strength(scene: Scene) -> None:
-    """Raise `ConfigError` if the fewest legs that stand at once cannot carry the robot."""
+    """Raise `ConfigError` if legs or samples are not those of a robot that can keep its balance.
+
+    The fewest legs that stand at once have to carry it.
+    """
     body, gait = scene.legged
-    robot = body.robot
+    robot, count = body.robot, body.robot.home.shape[1]
+    if count < 3:
+        raise ConfigError(
+            f'{scene.source}: legs of {scene.robot} have {count} joints: at least 3 are needed to'
+            ' keep the balance on L2: walk with --fidelity L1'
+        )
+    slowest = 16.0 * math.sqrt(GRAVITY / body.height)
+    if scene.sensors.rate < slowest:
+        raise ConfigError(
+            f'{scene.source}: sensors.rate = {scene.sensors.rate:g} Hz is not allowed: at least'
+            f' {slowest:.3g} Hz is needed to keep the balance on L2'
+        )
     if sliding := [each.name for leg in robot.chains.legs for each in leg if each.slides]:
         raise ConfigError(
             f'{scene.source}: fidelity L2 is not for robots with joints that slide, as'

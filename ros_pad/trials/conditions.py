@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ros_pad.trials.bag_notes import AMBIENT_PRESSURE
-from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import Metrics, Trial
 
 
 def rows(trial: Trial) -> list[tuple[str, str]]:
@@ -45,24 +45,22 @@ def rows(trial: Trial) -> list[tuple[str, str]]:
         'scheduled faults': '; '.join(settings.get('faults', ())) or 'none',
         'recorded': settings.get('recorded', ''),
         'versions': ', '.join(f'{name} {version}' for name, version in versions.items()),
-        'command to repeat it': _repeated_by(trial) if trial.scene and trial.fidelity else '',
+        'command to repeat it': _repeated_by(trial, own) if own and trial.fidelity else '',
     }
     return [(name, text) for name, text in found.items() if text]
 
 
-def _repeated_by(trial: Trial) -> str:
+def _repeated_by(trial: Trial, own: Metrics) -> str:
     """Return the command that repeats a simulated trial."""
-    own = trial.metrics
-    if own is None:
-        return ''
-    words = ['pad', 'run', trial.scene, '--policy', trial.policy, '--seed', str(trial.seed)]
-    words += ['--fidelity', trial.fidelity]
-    whole = not own.verdict and not trial.settings.get('interrupted')
+    settings = trial.settings
+    scene = settings.get('conditions', {}).get('source', trial.scene)
+    options = {'policy': trial.policy, 'seed': str(trial.seed), 'fidelity': trial.fidelity}
+    whole = not own.verdict and not settings.get('interrupted')
     if whole and own.cycles >= 1.0 and abs(own.cycles - round(own.cycles)) < 0.01:
-        words += ['--cycles', str(round(own.cycles))]
-    if trial.settings.get('foot'):
-        words += ['--foot', str(trial.settings['foot'])]
-    return shlex.join(words)
+        options['cycles'] = str(round(own.cycles))
+    options |= {name: str(settings[name]) for name in ('foot', 'sensing') if settings.get(name)}
+    words = [word for name, each in options.items() for word in (f'--{name}', each)]
+    return shlex.join(['pad', 'run', scene, *words])
 
 
 def _listed(values: Mapping[str, Any], of: str = '') -> list[str]:

@@ -12,7 +12,7 @@ import math
 import pathlib
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,24 +61,45 @@ def scene_of(urdf: str, feet: Sequence[str], case: str, cycles: int) -> Scene:
         return Scene.load(file)
 
 
+def robots_of(file: pathlib.Path | None) -> dict[str, list[str]]:
+    """Return URDF and feet of the shipped go2, and of the robots in a file."""
+    robots = {'shipped go2': ['go2']}
+    if file:
+        for name, (urdf, *feet) in yaml.safe_load(file.read_text()).items():
+            robots[name] = [str(file.parent / urdf), *feet]
+    return robots
+
+
+def walk(scene: Scene, robot: FullRobot, push: float, seed: int) -> Iterator[None]:
+    """Walk until the end or a verdict; yield after each step.
+
+    From 1 s of walking on, a force of ``push`` times the weight acts on the trunk for 0.2 s every
+    3 s, each time in another direction.
+    """
+    random, push = np.random.default_rng(seed), push * scene.body.mass * GRAVITY
+    trunk = robot.data.xfrc_applied[robot.model.body('trunk').id]
+    for _ in range(round(scene.duration / robot.period)):
+        since = (robot.time - scene.settle - 1.0) % 3.0
+        if push and robot.time > scene.settle + 0.9 and since < 0.99 * robot.period:
+            angle = random.uniform(0.0, math.tau)
+            trunk[:2] = push * math.cos(angle), push * math.sin(angle)
+        elif since >= 0.2:
+            trunk[:] = 0.0
+        robot.step([0.0] * len(robot.legs))
+        yield
+        if robot.verdict:
+            break
+
+
 def walked(
     name: str, urdf: str, feet: Sequence[str], case: str, cycles: int, seed: int
 ) -> dict[str, Any]:
     """Walk, and return what happened."""
     scene = scene_of(urdf, feet, case, cycles)
     robot = FullRobot(scene, scene.floor.build(seed), PERIOD)
-    random, push = np.random.default_rng(seed), CASES[case][2] * scene.body.mass * GRAVITY
-    trunk = robot.data.xfrc_applied[robot.model.body('trunk').id]
     stood, start, last = 0.0, None, np.zeros(2)
     begun = time.perf_counter()
-    for _ in range(round(scene.duration / PERIOD)):
-        since = (robot.time - scene.settle - 1.0) % 3.0
-        if push and robot.time > scene.settle + 0.9 and since < 0.99 * PERIOD:
-            angle = random.uniform(0.0, math.tau)
-            trunk[:2] = push * math.cos(angle), push * math.sin(angle)
-        elif since >= 0.2:
-            trunk[:] = 0.0
-        robot.step([0.0] * len(robot.legs))
+    for _ in walk(scene, robot, CASES[case][2], seed):
         here = np.array(robot.body[:2])
         if robot.time >= scene.settle and start is None:
             start, last = here, here
@@ -86,8 +107,6 @@ def walked(
             standing = int((robot.contacts[:, 2] > 1.0).sum())
             stood += standing * float(np.linalg.norm(here - last))
             last = here
-        if robot.verdict:
-            break
     gait = scene.legged[1]
     want = gait.body_advance(cycles * gait.cycle)
     start = last if start is None else start
@@ -125,14 +144,11 @@ def main(words: Sequence[str] | None = None) -> int:
     part.add_argument('--cases', nargs='+', choices=CASES, default=list(CASES), metavar='CASE')
     command.add_count(part, '--cycles', 40, 'gait cycles of a walk')
     command.add_count(part, '--seeds', 3, 'walks of each case')
-    command.add_count(part, '--first', 501, 'first seed', least=0)
+    command.add_count(part, '--first', 601, 'first seed', least=0)
     command.add_processes(part)
     command.add_out(part)
     args = part.parse_args(words)
-    robots = {'shipped go2': ['go2']}
-    if args.robots:
-        for name, (urdf, *feet) in yaml.safe_load(args.robots.read_text()).items():
-            robots[name] = [str(args.robots.parent / urdf), *feet]
+    robots = robots_of(args.robots)
     cases = [
         (name, row[0], row[1:], case, args.cycles, args.first + seed)
         for case in args.cases

@@ -40,7 +40,7 @@ Solver = Callable[[Problem], np.ndarray]
 def problems(seeds: int, cycles: int, most: int) -> list[Problem]:
     """Walk, and return problems in which a force of least squares alone leaves its cone."""
     found: list[Problem] = []
-    fit = balance_step.fit
+    fit, chosen = balance_step.fit, compiled.worth_loading
 
     def noted(plan: Any, feet: Any, columns: Any, mean: float, push: Any, force: Any) -> None:
         fit(plan, feet, columns, mean, push, force)
@@ -52,6 +52,7 @@ def problems(seeds: int, cycles: int, most: int) -> list[Problem]:
             found.append(problem)
 
     balance_step.fit = noted
+    compiled.worth_loading = lambda *_: False  # compiled steps would not see it
     try:
         for seed in command.each(range(seeds), 'walking', 'walk'):
             scene = scene_of('go2', (), 'wet patches', cycles)
@@ -59,7 +60,7 @@ def problems(seeds: int, cycles: int, most: int) -> list[Problem]:
             while robot.time < scene.duration and not robot.verdict:
                 robot.step([0.0] * len(robot.legs))
     finally:
-        balance_step.fit = fit
+        balance_step.fit, compiled.worth_loading = fit, chosen
     return found[:: max(1, len(found) // most)]
 
 

@@ -5,6 +5,7 @@ import contextlib
 import dataclasses
 import math
 import os
+import pathlib
 import signal
 
 import numpy as np
@@ -290,6 +291,18 @@ faults:
     assert kinds[kinds.index('gap') + 1] == ''
     codes = records_of(tmp_path / 'bag')['estimate'].rows['doubt'][:, 1]
     assert 'no wrench' in {doubts.kind(code) for code in codes}
+
+
+def test_a_robot_from_urdf_without_markers(tmp_path):
+    urdf = pathlib.Path(__file__).resolve().parents[2] / 'bags' / 'quadruped' / 'robot.urdf'
+    named = f'robot: {urdf}\nfeet: [FL_foot, FR_foot, RL_foot, RR_foot]'
+    text = configuration.locate('scenes', 'quadruped_patches').read_text()
+    (tmp_path / 'mine.yaml').write_text(text.replace('robot: go2', named))
+    scene = dataclasses.replace(Scene.load(tmp_path / 'mine.yaml'), cycles=1)
+    on_nodes = composed.run(scene, 'flat', seed=1, bag=tmp_path / 'bag', sensing='joints')
+    without = trials.run(scene, 'flat', seed=1, sensing='joints')
+    assert len(on_nodes.odom) > 360  # the last control period is not whole
+    assert np.array_equal(on_nodes.odom, without.odom[: len(on_nodes.odom)])
 
 
 def test_a_replay_of_the_bag_is_equal_to_the_bit(walked):

@@ -351,7 +351,7 @@ def test_conditions_say_how_to_repeat_a_walk(walk):
     assert 'pad.stiffness 40.0' in rows['foot'] and 'wet_fraction 0.45' in rows['floor']
     assert rows['command to repeat it'] == (
         'pad run hexapod_patches --policy adaptive --seed 0 --fidelity L2 --cycles 3'
-        ' --foot large37'
+        ' --foot large37 --sensing markers'
     )
 
 

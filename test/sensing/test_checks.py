@@ -10,6 +10,9 @@ import pytest
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import from_rpy, transform
 from ros_pad.sensing.checks import Recording, check
+from ros_pad.simulation.full_robot import FullRobot
+from ros_pad.simulation.sensors import BodySensors
+from studies.closed_loop import gaits
 from studies.sensing import layouts
 
 GO2 = Robot.load('go2')
@@ -63,6 +66,30 @@ def test_nothing_is_found_in_an_honest_log(name, seed, part):
 @pytest.mark.parametrize('changes', [{'forces': None}, {'velocities': None}])
 def test_nothing_is_found_with_fewer_sensors(changes):
     assert faults(recording(log(), **changes)) == []
+
+
+@functools.cache
+def even_walk():
+    """Return readings of a walk on L2, in which nothing but its legs moves the body."""
+    pytest.importorskip('mujoco')
+    scene = gaits.scene_of('go2', (), 'dry', cycles=12)
+    robot = FullRobot(scene, scene.floor.build(1), gaits.PERIOD)
+    sensors, rows = BodySensors(scene, 1, len(robot.joint_names)), []
+    for _ in range(round(scene.duration / gaits.PERIOD)):
+        robot.step([0.0] * 4)
+        rows.append((robot.time, *sensors.read(robot.proprioception(), robot.time)))
+    time, imu, joints, feet = map(np.array, zip(*rows, strict=True))
+    return time, imu[:, 0], imu[:, 1], time, *np.moveaxis(joints, 1, 0), feet['force']
+
+
+def test_nothing_is_found_in_an_even_walk():
+    """Swinging legs move the base, and not the centre of mass, along x."""
+    whole = Recording(GO2, *even_walk(), force_axes='foot')
+    part = (each[500:] for each in even_walk())
+    assert faults(whole) == faults(Recording(GO2, *part, force_axes='foot')) == []
+    forces = whole.ground_forces * (1.0, -1.0, 1.0)
+    turned = Recording(GO2, *even_walk()[:-1], forces)
+    only(turned, 'accelerometer or foot forces', 'are [x, -y] of')
 
 
 def test_forces_in_the_axes_of_the_feet_are_understood():
@@ -162,6 +189,13 @@ def test_what_the_body_estimator_doubts_is_found():
 def test_stamps_of_imu_and_joints_that_are_apart(late):
     words = f'{abs(1e3 * late):.0f} ms {"later" if late > 0.0 else "earlier"} than the IMU'
     only(recording(log(), joint_time=log().time + late), 'joints', words, 'warning')
+
+
+def test_a_delay_that_is_not_seen_is_not_judged():
+    """Later fits worse and earlier does not."""
+    walk, part = log('go2', 'patches', 4), slice(490, 1100)
+    (found,) = check(recording(walk, part=part, joint_time=walk.time[part] - 0.012))
+    assert found.what == 'not judged' and found.found.endswith('delay between IMU and joints')
 
 
 def test_positions_in_degrees():

@@ -98,7 +98,8 @@ def test_forces_are_those_of_a_general_solver(legs):
                         options={'maxiter': 500, 'ftol': 1e-12})  # fmt: skip
         side = np.hypot(found[:, 0], found[:, 1])
         assert (side <= feet[GRIP] * found[:, 2] * (1.0 + 1e-9) + 1e-9).all()
-        assert cost(found.ravel()) <= 1.01 * best.fun + 0.01 * cost(0.0 * start)
+        # Beside the cost of no force at all, as the best one may be next to nothing.
+        assert cost(found.ravel()) - best.fun < 5e-3 * cost(0.0 * start)
 
 
 @pytest.mark.slow
@@ -153,16 +154,20 @@ def test_a_walk_that_cannot_go_on_says_so():
     foot = dataclasses.replace(SCENE.foot, friction=1e-3, shear_strength=0.0)
     robot, rows = walk(dataclasses.replace(SCENE, foot=foot), pushes=0.3)
     assert np.isfinite(rows).all()
-    assert robot.verdict is None or 'tip-over' in robot.verdict
+    assert 'tip-over' in robot.verdict
 
 
 def test_torque_and_speed_limits_hold():
     weak = dataclasses.replace(SCENE, cycles=6)
     robot = FullRobot(weak, weak.floor.build(0), 0.004)
-    effort = [joint.torque for leg in weak.body.robot.chains.legs for joint in leg]
+    joints = [joint for leg in weak.body.robot.chains.legs for joint in leg]
+    most, fastest = np.array([(joint.torque, joint.speed) for joint in joints]).T
+    robot.data.qvel[6 : 6 + len(joints)] = 1.5 * fastest
+    robot.step([0.0] * 4)
+    assert (robot.data.ctrl <= 0.0).all()  # no motor drives a joint that is too fast
     for _ in range(900):
         robot.step([0.0] * 4)
-        assert (np.abs(robot.data.actuator_force) <= np.array(effort) + 1e-9).all()
+        assert (np.abs(robot.data.actuator_force) <= most + 1e-9).all()
 
 
 def test_feet_find_ground_by_load():
