@@ -170,7 +170,7 @@ def _of_liquid(scene: Scene, policy: str) -> list[Term]:
         _pull(scene, policy),
     ]
     if stand.on_domes > 0.0:
-        dry = stand.resistance(0.0, THICK_FILM) - stand.resistance(THICK_FILM, THICK_FILM)
+        dry = abs(stand.resistance(0.0, THICK_FILM) - thick)
         of_friction.append(
             Term(
                 'shape of the film under domes',
