@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import pathlib
 import resource
 import subprocess
@@ -21,8 +20,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ros_pad import configuration
-from ros_pad.contact import LARGE_PAD, film_thickness, force_limit, inflate
+from ros_pad.contact import LARGE_PAD, force_limit, inflate
 from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
 from ros_pad.reports.files import save
@@ -31,14 +29,11 @@ from ros_pad.reports.style import STYLE, rendered
 from ros_pad.reports.view import view_of
 from ros_pad.simulation import Scene
 from ros_pad.simulation.margin import mid_stance_grip, reserve
-from ros_pad.simulation.terms import terms
 from ros_pad.trials import Trial, run
 from studies import command
 from studies.closed_loop import walk_map
-from studies.work_precision.film import STANCE_DOME, dry_dome
 
 SCENE, SEED = 'hexapod_patches', 0
-RISE = 0.03  # s in which the load of a dome in mid-stance comes
 
 
 def lead_picture(trials: Sequence[Trial], path: pathlib.Path) -> None:
@@ -96,7 +91,6 @@ def figures(trials: Sequence[Trial], processor_s: float) -> dict[str, Any]:
             'flat, dry': friction.flat_dry,
             'flat, wet': friction.flat_wet,
         },
-        'soft_film': _soft_film(scene),
         'pad': {
             'height_m': inflate(LARGE_PAD, 75e3).height,
             'force_limit_n': force_limit(LARGE_PAD, 75e3),
@@ -111,26 +105,6 @@ def _walk(trial: Trial) -> dict[str, Any]:
         'slip_m_a_foot': float(np.mean(trial.metrics.slip_path_m)),
         'switches': sum(trial.metrics.switches),
         'times_real_time': trial.real_time_factor,
-    }
-
-
-def _soft_film(scene: Scene) -> dict[str, float]:
-    """Return what a soft film may cost, and the dry shares of a dome whose load comes slowly."""
-    losses = [
-        term.bound or 0.0
-        for name in configuration.names('scenes')
-        if not name.startswith('bench_')
-        for term in terms(Scene.load(name))
-        if term.term.startswith('dimple')
-    ]
-    load, pressure, time = STANCE_DOME
-    foot, depth = scene.foot, scene.floor.film_thickness
-    rigid = film_thickness(depth, pressure, math.sqrt(load / (math.pi * pressure)), time)
-    return {
-        'largest_loss': max(losses),
-        'rise_s': RISE,
-        'dry_soft': dry_dome(foot, depth, RISE),
-        'dry_rigid': math.exp(-((float(rigid) / foot.critical_film) ** foot.film_exponent)),
     }
 
 

@@ -9,9 +9,11 @@ from 150 and 300 rings with a tolerance of 1e-8.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 import matplotlib
@@ -25,11 +27,10 @@ from ros_pad.contact import (
     Squeezed,
     film_thickness,
     inflate,
-    press,
     squeeze,
     trapped_film,
 )
-from ros_pad.contact.film import WATER_VISCOSITY
+from ros_pad.contact.film import WATER_VISCOSITY, Film
 from ros_pad.contact.resistance import Foot
 from ros_pad.simulation import Scene
 from ros_pad.trials.loop import ClosedLoop
@@ -56,14 +57,10 @@ SOLES = {
 
 WALKS, SEEDS, CYCLES, RATE = ('hexapod_patches', 'quadruped_patches'), (0, 1, 2), 20, 1000.0  # Hz
 BOUNCE, SHORTEST = 0.05, 0.2  # s off the floor within a stance, s that a stance lasts at least
-STANCE_DOME = 0.185, 70e3, 0.3  # N, Pa and s: a dome of hexapod_patches in mid-stance
+HISTORIES, STEP = command.ROOT / 'test' / 'reference' / 'landing.json', 1e-3  # s
 
 TIMES = (1.0, 3.0)  # s, of the thesis' drag
 RIM = np.geomspace(1e-6, 10.0, 141)
-
-STIFF = 0.1
-"""Mean dimple over the film of Stefan and Reynolds up to which that film is the mean film within
-10 %."""
 
 
 # --- time against error --------------------------------------------------------------------------
@@ -107,10 +104,10 @@ def dome_dimple(load: float, time: float) -> float:
     return (3.0 * WATER_VISCOSITY * contact(load) ** 6 / drained) ** 0.25
 
 
-Film = Callable[..., float]
+Solved = Callable[..., float]
 
 
-def problem(name: str, film: Film, inputs: dict[str, list[float]]) -> Problem:
+def problem(name: str, film: Solved, inputs: dict[str, list[float]]) -> Problem:
     """Return cases with their true films."""
     cases = list(zip(*inputs.values(), strict=True))
     truth = []
@@ -121,7 +118,7 @@ def problem(name: str, film: Film, inputs: dict[str, list[float]]) -> Problem:
     return Problem(name, columns, np.array(truth), np.ones(len(cases), dtype=bool), math.inf)
 
 
-def soft_methods(film: Film) -> list[Method]:
+def soft_methods(film: Solved) -> list[Method]:
     """Return the soft film with more and more rings, and with loose time steps."""
     methods = [
         Method(f'{rings} rings', lambda x, time, n=rings: film(x, time, n), ours=True)
@@ -242,14 +239,38 @@ def rises() -> list[dict[str, Any]]:
     return rows
 
 
-def dry_dome(foot: Foot, depth: float, rise: float) -> float:
-    """Return the dry share under ``STANCE_DOME`` when its load has grown in a time, s."""
-    load, pressure, time = STANCE_DOME
-    b = math.sqrt(load / (math.pi * pressure))
-    sphere = float(press(foot.pad, pressure, load).sphere_radius)
-    surface = Membrane(1.51 * b, 0.5 * pressure * sphere, pressure)
-    soft = squeeze(surface, depth, [time], load=load, rise=rise, rings=150, tolerance=1e-4)
-    return float(dry_shares(soft, b)[0])
+def histories() -> list[dict[str, Any]]:
+    """Return dry shares of load histories, by the film of walks and by rigid discs.
+
+    Beside those of an elastohydrodynamic film on 300 even rings, made outside this project; and
+    the time of a step, s.
+    """
+    rows = []
+    for row in json.loads(HISTORIES.read_text(encoding='utf-8')):
+        pressure, times = row['pressure_Pa'], row['times_s']
+        foot, steps = Foot.load('large37'), np.arange(1, round(times[-1] / STEP) + 1) * STEP
+        loads = np.interp(steps, *np.array(row['force']).T)
+        film, shares = Film(foot, row['viscosity_Pa_s']), {}
+        film.touch_down(row['initial_film_m'])
+        film.drain(foot.pads * row['force'][0][1], 0.0, pressure, 1e-6)
+        start = perf_counter()
+        films = [film.drain(foot.pads * each, 0.0, pressure, STEP)[0] for each in loads.tolist()]
+        taken = (perf_counter() - start) / len(steps)
+        radii = np.sqrt(loads / math.pi / pressure)
+        growth = 4.0 * pressure * STEP / (3.0 * row['viscosity_Pa_s'] * radii**2)
+        shares['reduced'] = _dry(np.array(films))
+        shares['rigid'] = _dry((row['initial_film_m'] ** -2 + np.cumsum(growth)) ** -0.5)
+        rows.append(
+            {key: row[key] for key in ('name', 'times_s', 'dry_share')}
+            | {key: np.interp(times, steps, values).tolist() for key, values in shares.items()}
+            | {'curves': {key: values[::4].tolist() for key, values in shares.items()}}
+            | {'step_s': taken}
+        )
+    return rows
+
+
+def _dry(film: np.ndarray) -> np.ndarray:
+    return np.asarray(np.exp(-((film / CRITICAL) ** 2)))
 
 
 def rise_times(force: np.ndarray, period: float) -> list[tuple[float, float]]:
@@ -273,7 +294,7 @@ def rise_times(force: np.ndarray, period: float) -> list[tuple[float, float]]:
 
 def landings() -> list[dict[str, Any]]:
     """Return how fast simulated walks load their feet on domes: 5, 50 and 95 % of stances."""
-    rows, hexapod = [], Scene.load(WALKS[0])
+    rows = []
     for name in command.each(WALKS, 'landings', 'scene'):
         scene = replace(Scene.load(name), cycles=CYCLES)
         scene = replace(scene, sensors=replace(scene.sensors, rate=RATE))
@@ -284,36 +305,18 @@ def landings() -> list[dict[str, Any]]:
             for leg in force.T:
                 found += rise_times(leg, 1.0 / RATE)
         half, most = np.quantile(found, (0.05, 0.5, 0.95), axis=0).T.tolist()
-        dry = [dry_dome(hexapod.foot, DEPTH, rise / 0.8) for rise in most]
-        rows.append(
-            {'scene': name, 'stances': len(found), 'half_s': half, 'rise_s': most, 'dry': dry}
-        )
+        rows.append({'scene': name, 'stances': len(found), 'half_s': half, 'rise_s': most})
     return rows
-
-
-def rule(rings: int = 100) -> list[dict[str, float]]:
-    """Return by how much the mean film exceeds the rigid one, by dimple over rigid film."""
-    rows, times = [], np.geomspace(1e-3, 1.0, 4)
-    rigid = np.array(film_thickness(DEPTH, MEAN, RADIUS, times))
-    grid = sole(4e10, times, rings).mean / rigid  # a rigid disc's, with so many rings
-    for modulus in command.each(np.geomspace(4e6, 4e9, 7).tolist(), 'rule', 'sole'):
-        excess = sole(modulus, times, rings).mean / rigid / grid - 1.0
-        lens = trapped_film(RADIUS, modulus, MEAN) / rigid
-        rows += [
-            {'dimple_over_film': float(x), 'excess': float(y)}
-            for x, y in zip(lens, excess, strict=True)
-        ]
-    return sorted(rows, key=lambda row: row['dimple_over_film'])
 
 
 # --- picture and tables --------------------------------------------------------------------------
 
 
-def draw(results: Sequence[Result]) -> Figure:
-    """Return the picture: time against error above, shapes below."""
+def draw(results: Sequence[Result], kept: Sequence[dict[str, Any]]) -> Figure:
+    """Return the picture: time against error, shapes, and dry shares of load histories."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.6, 7.0), layout='constrained')
-        above, below = figure.subplots(2, 2)
+        figure = Figure(figsize=(8.6, 10.2), layout='constrained')
+        above, below, last = figure.subplots(3, 2)
         names = list(dict.fromkeys(result.problem for result in results))
         for panel, name in zip(above, names, strict=True):
             _work(panel, [result for result in results if result.problem == name])
@@ -321,7 +324,26 @@ def draw(results: Sequence[Result]) -> Figure:
         below[0].set_title('flat pad of Dragon Skin 10, times 1.88, under 0.3 N')
         _shapes(below[1], dome(0.19, [1e-3, 1e-2, 0.1, 1.0]), contact(0.19), AIR)
         below[1].set(title='dome of 75 kPa under 0.19 N', ylim=(3e-2, 1e3))
+        _histories(*last, kept)
     return figure
+
+
+def _histories(left: Any, right: Any, rows: Sequence[dict[str, Any]]) -> None:
+    """Draw dry shares after loads that came in a time, and in a stance of a walk."""
+    ramps = [row for row in rows if row['name'].startswith('ramp')]
+    rises = [float(row['name'].split()[1]) for row in ramps]
+    colours = {'reduced': BLUE, 'rigid': VERMILION}
+    words = {'reduced': 'film of walks', 'rigid': 'rigid discs'}
+    for key, colour in colours.items():
+        left.plot(rises, [row[key][-1] for row in ramps], 'o-', color=colour, label=words[key])
+        curve = rows[-1]['curves'][key]
+        right.plot(4e3 * STEP * np.arange(len(curve)), curve, color=colour)
+    left.plot(rises, [row['dry_share'][-1] for row in ramps], 'kx', label='elastohydrodynamic')
+    right.plot(1e3 * np.array(rows[-1]['times_s']), rows[-1]['dry_share'], 'kx')
+    left.set(xscale='log', ylim=(0, 1), xlabel='time in which the load comes (ms)')
+    left.set(ylabel='dry share after 0.3 s', title='dome of 70 kPa under 0.185 N')
+    right.set(ylim=(0, 1), xlabel='time in stance (ms)', title='a stance of hexapod_patches')
+    left.legend(frameon=False, fontsize=7)
 
 
 def _work(panel: Any, results: Sequence[Result]) -> None:
@@ -368,10 +390,11 @@ def main(words: Sequence[str]) -> int:
         'domes': domes(),
         'rises': rises(),
         'landings': landings(),
-        'rule': rule(),
+        'histories': histories(),
     }
-    kept = command.write(options.out, 'film', document, {'film': draw(results)})
-    parts = ('rows', 'soles', 'domes', 'rises', 'landings', 'rule')
+    figure = draw(results, document['histories'])
+    kept = command.write(options.out, 'film', document, {'film': figure})
+    parts = ('rows', 'soles', 'domes', 'rises', 'landings', 'histories')
     texts = (command.listed(document[part], f'\n{part}') for part in parts)
     command.show(options, kept, '\n'.join(texts))
     return 0

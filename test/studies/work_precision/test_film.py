@@ -16,14 +16,14 @@ def document():
     return json.loads((command.CHARTS / 'film.json').read_text(encoding='utf-8'))
 
 
-def test_the_rule_separates_rigid_from_soft_films():
-    rows = film.rule(rings=25)
-    stiff = [row['excess'] for row in rows if row['dimple_over_film'] <= film.STIFF]
-    soft = [row['excess'] for row in rows if row['dimple_over_film'] >= 2.0 * film.STIFF]
-    assert len(stiff) > 5 and len(soft) > 5
-    assert max(stiff) < 0.1 < min(soft)
-    # The rigid film and the mean dimple together are more than the soft film.
-    assert all(0.0 < row['excess'] < row['dimple_over_film'] for row in rows)
+def test_histories_beside_the_reference():
+    """The film of walks is nearer than rigid discs, in points of dry share."""
+    rows = film.histories()
+    off = {
+        key: np.concatenate([np.subtract(row[key], row['dry_share']) for row in rows])
+        for key in ('reduced', 'rigid')
+    }
+    assert np.sqrt(np.mean(off['reduced'] ** 2)) < 0.03 < 0.3 < np.sqrt(np.mean(off['rigid'] ** 2))
 
 
 def test_kept_figures_have_the_closed_forms(document):
