@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ros_pad.errors import ConfigError
 from ros_pad.simulation import Scene
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.mujoco_model import SolverSettings
+from ros_pad.simulation.mujoco_model import POINT, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Tow
 from ros_pad.simulation.terrain import Floor
@@ -385,3 +385,43 @@ def test_gyro_and_accelerometer_integrate_to_the_motion():
     assert np.ptp(rows[250:, 6]) > 0.15  # the walk is not trivial
     angles = np.unwrap(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
     assert 0.004 * rows[:, 2].sum() == pytest.approx(angles[-1], abs=2e-3)
+
+
+def rises(timestep):
+    """Return the times in which feet on domes take 10 to 90 % of their first peak, s."""
+    settings = SolverSettings(timestep=timestep)
+    robot, loads = FullRobot(scene_of(cycles=3), WET, 0.004, settings), []
+    rub = robot.soles.rub
+    robot.soles.rub = lambda: (loads.append(robot.soles._loads.copy()), rub())
+    advance(robot, 0.5 + 3.0 * GAIT.cycle, pressures=[75e3] * 6)
+    found = []
+    for load in np.array(loads).T:
+        ends = np.flatnonzero((load[:-1] <= 0.0) & (load[1:] > 0.0))
+        for end in ends[np.diff(np.append(-1.0, ends)) * timestep > 0.05]:
+            own = load[end : end + round(0.03 / timestep)]
+            falls = (own[1:-1] > own[2:]) & (own[1:-1] > 1.0)  # N
+            if not falls.any():
+                continue
+            peak = 1 + int(falls.argmax())
+            at = np.interp([0.1 * own[peak], 0.9 * own[peak]], own[: peak + 1],
+                           timestep * np.arange(peak + 1))  # fmt: skip
+            found.append(at[1] - at[0])
+    return found
+
+
+def test_landings_do_not_hang_on_the_step():
+    usual, fine = rises(SolverSettings().timestep), rises(0.2 * SolverSettings().timestep)
+    assert len(usual) > 10 and len(fine) > 10
+    assert np.median(usual) == pytest.approx(np.median(fine), rel=0.1)
+    assert 2e-3 < np.median(fine) < 10e-3
+
+
+def test_a_foot_is_the_spring_of_its_domes():
+    """Standing on domes of 75 kPa it sinks by its load over 7.29 kN/m."""
+    robot = FullRobot(scene_of(), DRY, 0.004)
+    advance(robot, 0.49, pressures=[75e3] * 6)
+    depths = (
+        POINT - robot.data.geom_xpos[[robot.model.geom(f'foot_{i}').id for i in range(1, 7)], 2]
+    )
+    assert depths * 7.29e3 == pytest.approx(robot.contacts[:, 2], rel=5e-3)
+    assert robot.contacts[:, 2].sum() == pytest.approx(WEIGHT, rel=0.01)
