@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 WATER_VISCOSITY = 1.0e-3  # Pa s, at 20 degC
 
 LANDING = 7e-3
-"""Time in which half of the load of a foot comes, s. Domes are then as dry, 0.82, as under the loads
-of the hexapod on L2, 0.82 to 0.84; those of the quadruped are 0.67 dry."""
+"""Time in which half of the load of a foot comes, s. Domes are then as dry, 0.82, as those of the
+hexapod on L2, 0.82 to 0.84 in the mean; those of the quadruped are 0.67 dry."""
 
 
 def film_thickness(
@@ -77,6 +77,16 @@ def film_thickness(
     )
     drained = 4.0 * pressure * duration / (3.0 * eta * radius**2)
     return plain(start / np.sqrt(1.0 + drained * start**2))
+
+
+def landed(since: float, time: float) -> float:
+    """Return the share of the load of a foot that has come after its touch-down.
+
+    Half of it lands, the rest comes evenly until ``time``; both in s.
+    """
+    if since < LANDING:
+        return 0.5 * max(since, 0.0) / LANDING
+    return min(1.0, 0.5 + 0.5 * (since - LANDING) / max(time - LANDING, LANDING))
 
 
 class Film:

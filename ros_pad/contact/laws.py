@@ -66,7 +66,7 @@ def between(values: Any, place: float) -> float:
 def touch_down(film: Any, thickness: float) -> None:
     """Start a stance on a film, m; 0 is dry ground."""
     film[FRESH], film[AREA] = thickness, 0.0
-    film[SOLE] = thickness**-2 if thickness > 0.0 else inf
+    film[SOLE] = 1.0 / (thickness * thickness) if thickness > 0.0 else inf
 
 
 def drained(
@@ -182,12 +182,16 @@ def level(foot: Any, film: Any, pressure: float, sphere: float, time: float) -> 
         return
     tension = 0.5 * pressure * sphere
     if rim < 0.5 * radius:
-        fourth = rim**4 + tension * core**3 / (6.0 * foot.viscosity) * time
-        sixth = fourth**1.5 + 0.605 * tension * sphere * core**4 / foot.viscosity * time
+        cube, square = core * core * core, rim * rim
+        fourth = square * square + tension * cube / (6.0 * foot.viscosity) * time
+        sixth = (
+            fourth * sqrt(fourth) + 0.605 * tension * sphere * cube * core / foot.viscosity * time
+        )
         film[RIM] = min(0.5 * radius, sixth ** (1.0 / 6.0))
     else:
-        rate = 12.9 * pressure * sphere * sphere / (foot.viscosity * radius**6)
-        film[CORE] = (core**-4 + rate * time) ** -0.25
+        cube, square = radius * radius * radius, core * core
+        rate = 12.9 * pressure * sphere * sphere / (foot.viscosity * cube * cube)
+        film[CORE] = 1.0 / sqrt(sqrt(1.0 / (square * square) + rate * time))
 
 
 def dry_share(foot: Any, film: Any, sphere: float) -> float:

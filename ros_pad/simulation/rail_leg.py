@@ -15,7 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ros_pad.configuration import instance, number
-from ros_pad.contact.film import Film
+from ros_pad.contact import laws
+from ros_pad.contact.film import Film, landed
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
 from ros_pad.simulation.robot import FootState, Vector, check_pressures
@@ -63,10 +64,10 @@ class RailLeg:
         self._scene = scene
         self._floor = floor
         self._foot = scene.foot.on_rough(scene.floor.roughness)
-        self._film = Film(self._foot, scene.floor.viscosity)
+        self.film = Film(self._foot, scene.floor.viscosity)
         self._x = self.speed = 0.0
         self.feet[0].standing = True
-        self._film.touch_down(floor.depth(self.plan(0.0)[1], 0.0))
+        self.film.touch_down(floor.depth(self.plan(0.0)[1], 0.0))
 
     @property
     def body(self) -> Vector:
@@ -113,20 +114,26 @@ class RailLeg:
             When the sequence is not one finite pressure.
         """
         check_pressures(pressures, 1)
-        dt, state, foot, (body, _) = self.period, self.feet[0], self._foot, self._rail
+        dt, state, foot, (body, gait) = self.period, self.feet[0], self._foot, self._rail
         before = self.plan(self.time)[1]
         self.time = (round(self.time / dt) + 1) * dt
         stands, offset, height = self.plan(self.time)
         back = (before - offset) / dt
         if stands and not state.standing:
-            self._film.touch_down(self._floor.depth(self._x + offset, 0.0))
+            self.film.touch_down(self._floor.depth(self._x + offset, 0.0))
         state.standing = stands
         cap = 0.0
         if stands:
             load, pressure = body.load, pressures[0]
             state.wet = self._floor.wet(self._x + offset, 0.0)
-            film = self._film if state.wet else None
-            cap = foot.grip(load, pressure, film, dt, state.slip_speed)
+            on_domes, films = foot.dome_load(load, pressure), (0.0, 0.0)
+            if state.wet:
+                since = (self.time - self._scene.settle) % gait.cycle
+                share = landed(since, 0.5 * gait.stance)
+                films = self.film.drain(
+                    share * on_domes, share * (load - on_domes), pressure, dt, state.slip_speed
+                )
+            cap = laws.resistance(foot, on_domes, load - on_domes, pressure, *films)
             if pressure > 0.0 and foot.dome_load(load, pressure) < load:
                 state.overload_time += dt
         free = self.speed - GRAVITY * math.sin(self._scene.floor.slope) * dt

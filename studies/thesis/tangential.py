@@ -85,7 +85,7 @@ def slip_force(foot: Foot, setup: Any, load: float, pressure: float, wet: bool) 
         return dry
     film = Film(foot, setup.viscosity)
     film.touch_down(setup.film_thickness)
-    films = film.stand(domes, sole, pressure, setup.dwell)
+    films = film.drain(domes, sole, pressure, setup.dwell)  # the load comes evenly
     step = dry / _STEPS
     pull, last = 0.0, 0.0
     while True:

@@ -324,7 +324,7 @@ def draw(results: Sequence[Result], kept: Sequence[dict[str, Any]]) -> Figure:
         below[0].set_title('flat pad of Dragon Skin 10, times 1.88, under 0.3 N')
         _shapes(below[1], dome(0.19, [1e-3, 1e-2, 0.1, 1.0]), contact(0.19), AIR)
         below[1].set(title='dome of 75 kPa under 0.19 N', ylim=(3e-2, 1e3))
-        _histories(*last, kept)
+        _histories(last[0], last[1], kept)
     return figure
 
 

@@ -25,7 +25,7 @@ def test_all_charts_of_short_walks(tmp_path, monkeypatch, capsys):
     assert np.array_equal(other, free) and not np.array_equal(other, pushed)
     loads = free[3:, 0]
     assert loads.sum(0).mean() == pytest.approx(1.0, abs=0.01)
-    assert loads[0, 2] == 0.0 < 0.2 < loads[0, 10]  # FL lands at sample 5
+    assert loads[0, 2] < 1e-3 < 0.2 < loads[0, 10]  # FL lands at sample 5
     found = [(row['control_ms'], row['falls'], row.get('place')) for row in steps['rows']]
     assert found[0] == (4, 0, 0.0) and found[1][2] > 0.0
     assert found[2:] == [(16, 1, None)] * 2

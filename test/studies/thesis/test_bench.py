@@ -118,10 +118,10 @@ def test_the_title_is_decided_where_all_draws_agree(changes, holds):
     (claim,) = (claim for claim in trial.claims if 'Title' in claim.thesis)
     assert claim.holds is holds
     (shipped,) = (claim for claim in TRIALS['tangential'].claims if 'Title' in claim.thesis)
-    # By hand: films drain to 57 to 62 nm in 2.2 to 4.1 s until slip, so 1 − exp(−0.124²) at most
-    # of the dry force is lost.
+    # By hand: a load that comes in 1 s lays 11 nm at the edge, and twice as much at an eighth of
+    # its area, so about 1 − exp(−0.03²) of the dry force is lost.
     assert shipped.verdict == 'underdetermined'
-    assert min(shipped.numbers[:3]) > -0.0155 and max(shipped.numbers[:3]) < -0.005
+    assert min(shipped.numbers[:3]) > -0.0015 and max(shipped.numbers[:3]) < -0.0005
 
 
 @pytest.mark.parametrize(

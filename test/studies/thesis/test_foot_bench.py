@@ -8,8 +8,10 @@ import pathlib
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from ros_pad.contact import inflate
 from studies.thesis import bench, foot_bench
 from studies.thesis.bench_scene import BenchScene
 from studies.thesis.foot_bench import DOME, FLAT, ROUGH, SMOOTH
@@ -49,13 +51,20 @@ def test_lines_of_dry_ground_and_of_a_film_that_stays(name, slope):
 
 
 def onset(load, morphology, critical, conforming):
-    """Return the force at which stage and film meet, by Stefan and Reynolds in closed form."""
+    """Return the force at which stage and film meet, by closed forms.
+
+    A flat sole: Stefan and Reynolds. A dome: what a load that comes evenly lays.
+    """
     if morphology == DOME:
-        pressure, radius = PRESSURE, math.sqrt(load / (PADS * math.pi * PRESSURE))
+        radius = math.sqrt(load / (PADS * math.pi * PRESSURE))
         dry = MU * load + SHEAR * load / PRESSURE
-    else:
-        pressure, radius = load / (math.pi * SOLE**2), SOLE
-        dry = MU * load + SHEAR * load / conforming
+        sphere = float(inflate(TRIAL.scene.foot.pad, PRESSURE).sphere_radius)
+        speed = 24.0 * VISCOSITY * radius / (2.0 * DWELL) / (PRESSURE * sphere)
+        edge = 0.3215 * sphere * speed ** (2.0 / 3.0)
+        touching = quad(lambda u: math.exp(-((edge * u ** (-1 / 3) / critical) ** 2)), 0.0, 1.0)[0]
+        return touching * dry + (1.0 - touching) * BOUNDARY * load
+    pressure, radius = load / (math.pi * SOLE**2), SOLE
+    dry = MU * load + SHEAR * load / conforming
 
     def missing(force):
         time = DWELL + force / (STIFFNESS * SPEED)
@@ -71,7 +80,9 @@ def onset(load, morphology, critical, conforming):
 @pytest.mark.parametrize('load', [0.25, 3.0])
 def test_wet_forces(morphology, floor, coarser, load):
     expected = onset(load, morphology, 0.5e-6 * coarser, CONFORMING * coarser)
-    assert pull(morphology, floor, load).wet == pytest.approx(expected, rel=1e-5)
+    # The rim of a dome's film levels a little more.
+    off = 1e-3 if morphology == DOME else 1e-5
+    assert pull(morphology, floor, load).wet == pytest.approx(expected, rel=off)
 
 
 def test_bounds_on_the_force_of_the_liquid():
