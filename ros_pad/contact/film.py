@@ -128,7 +128,7 @@ class Film:
     ...     load = 2.0 * min(1.0, step / 10)
     ...     domes, sole = film.drain(load, sole_load=0.0, pressure=75e3, duration=1e-3)
     >>> f'{1e6 * domes:.2f} and {1e6 * sole:.0f} micrometres'
-    '0.27 and 300 micrometres'
+    '0.25 and 300 micrometres'
     """
 
     def __init__(self, foot: Foot, viscosity: float = WATER_VISCOSITY) -> None:

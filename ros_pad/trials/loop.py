@@ -345,7 +345,7 @@ def run(
     >>> for scene in ('leg_wet_flat', 'leg_wet_dome_75'):
     ...     f'{1e3 * run(scene).metrics.distance_per_cycle_m:.0f} mm in a cycle'
     '9 mm in a cycle'
-    '45 mm in a cycle'
+    '48 mm in a cycle'
     """
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)

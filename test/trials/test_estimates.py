@@ -78,7 +78,7 @@ def test_slips_of_3_mm_raise_the_alarm_and_sticks_do_not(walks):
             for raised in np.flatnonzero(alarm[1:] & ~alarm[:-1]) + 1:
                 slid = way[min(raised + LATE, len(speed))] - way[max(raised - LOOK_BACK, 0)]
                 false += slid < STILL
-    assert slips > 500 and stuck > 1.5
+    assert slips > 400 and stuck > 1.5
     assert missed <= 0.01 * slips
     assert false <= stuck  # at most one a minute
 
