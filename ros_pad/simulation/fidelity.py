@@ -33,7 +33,7 @@ STICKING = 'no slip'
 """The answer without a simulation: feet never slip, so the body moves as the gait intends."""
 
 FRICTION = 'friction'
-"""Not a level: how much five per cent more friction changes a walk on the cheapest level."""
+"""Not a level: how much five per cent more friction changes a walk on the best level."""
 
 LEAST = 1e-4
 """Error that is added to every error, so that its logarithm is finite; no bound is below it."""

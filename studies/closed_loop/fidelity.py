@@ -77,10 +77,10 @@ def errors(scene: Scene, found: dict[str, Walk]) -> dict[str, float]:
     """
     top = found['top']
     rows: dict[str, Walk] = {**found, STICKING: (sticking_distance(scene), 0.0, 0.0)}
-    cheapest = found['L0' if scene.robot == RAIL_LEG else 'L1']
+    best = found['L0' if scene.robot == RAIL_LEG else 'L2']
     result = {}
     for name, walk in rows.items():
-        reference = cheapest if name == FRICTION else top
+        reference = best if name == FRICTION else top
         if name == 'top' or walk is None:
             continue
         for place, (metric, share) in enumerate(LEAST_SHARES.items()):

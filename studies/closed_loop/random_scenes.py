@@ -206,8 +206,7 @@ def walks(robot: str, seed: int) -> dict[str, Walk]:
     levels = ('L0',) if robot == RAIL_LEG else ('L1', 'L2')
     found = {level: walk(scene, policy, seed, level) for level in levels}
     found['top'] = walk(scene, policy, seed, levels[-1], top=True)
-    if robot != 'go2':
-        found['friction'] = walk(slippery(scene, MORE_FRICTION), policy, seed, levels[0])
+    found['friction'] = walk(slippery(scene, MORE_FRICTION), policy, seed, levels[-1])
     return found
 
 
