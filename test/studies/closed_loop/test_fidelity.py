@@ -91,8 +91,8 @@ def test_errors_by_hand():
     assert found['no slip distance'] == pytest.approx(0.9 / 0.7)
     assert found['L2 distance'] == pytest.approx(0.5 / 0.7)
     assert found['L2 slip'] == pytest.approx(0.25)
-    assert found['friction distance'] == pytest.approx(0.05)  # against L1
-    assert found['friction slip'] == pytest.approx(0.5)
+    assert found['friction distance'] == pytest.approx(0.33)  # against L2
+    assert found['friction slip'] == pytest.approx(0.036 / 0.05)
     assert 'no slip slip' not in found
     lost = study.errors(scene, {'L1': (1.4, 0.0, 0.1), 'L2': None, 'top': None, 'friction': None})
     assert lost['L1 distance'] == math.inf
