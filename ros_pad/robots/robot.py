@@ -406,7 +406,7 @@ def _from_table(table: Table, path: pathlib.Path) -> Robot:
     if 'servo' in table:
         with table.table('servo') as part:
             for key, unit, low, high in _MOTOR:
-                if key in part:
+                if key in part or ('stiffness' in part and key != 'speed'):
                     motor[key] = part.number(key, unit, low, high)
             if 'stiffness' in part:
                 others['servo'] = Servo.read(part)

@@ -140,6 +140,7 @@ def test_gaits_by_phase():
         ('foot: [0.0, 0.0, -0.213]', 'foot: [0.0, 0.0, -4.9]', r'leg FL: length = 5\.2.* 5 m'),
         ('mass: 15.02', 'mass: 15020.0', r'mass = 15020.0 .* 2000 kg \(not g\)'),
         ('foot_radius: 0.022', 'foot_radius: 0.9', 'foot_radius = 0.9 .* 0 to 0.52'),
+        ('  torque: 23.7', '  stiffness: 90.0\n  damping: 1.0', "servo: key 'torque' is missing"),
         ('{axis: [1.0', '{kind: prismatic, axis: [1.0', 'servo is not allowed: .* FL_hip_joint'),
     ],
 )
