@@ -22,7 +22,7 @@ import math
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,14 +31,12 @@ from ros_pad import configuration
 from ros_pad.configuration import Setting, Table, choice, instance, integer, number, quantity
 from ros_pad.contact import laws
 from ros_pad.contact.dome import inflate, press
+from ros_pad.contact.film import LANDING, Film
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, check_criterion, force_limit
 from ros_pad.contact.material import Material, factor_in
 from ros_pad.contact.pad import MeasuredLimit, Pad, broadcast, plain
 from ros_pad.errors import ConfigError, InvalidInput, NoEquilibrium
-
-if TYPE_CHECKING:
-    from ros_pad.contact.film import Film
 
 THICK_FILM = 1.0e-3
 """Thickness of a liquid film that does not drain under a flat sole within a stance, m."""
@@ -471,20 +469,33 @@ def tangential_resistance(
 
 
 class ExpectedFriction(NamedTuple):
-    """Friction coefficients of a foot: flat on dry and on wet ground, and as a dome."""
+    """Friction coefficients of a foot by the contact model.
+
+    Attributes
+    ----------
+    flat_dry, flat_wet, dome : float
+        Flat on dry and on wet ground, and as a dome on dry ground.
+    landed : float
+        As a dome on wet ground, just after half of the load has landed: from there friction grows,
+        at most to that on dry ground.
+    """
 
     flat_dry: float
     flat_wet: float
     dome: float
+    landed: float
 
 
 def expected_friction(foot: Foot, load: float) -> ExpectedFriction:
     """Return the friction coefficients of a foot by the contact model, at a load, N, above 0.
 
-    The coefficient of a dome is about the same on wet and dry ground.
+    Wet ground has water, too thick to drain under a flat sole.
     """
+    film, pressure = Film(foot), DOMED * foot.ceiling
+    film.touch_down(THICK_FILM)
     return ExpectedFriction(
-        float(tangential_resistance(foot, load, 0.0)) / load,
-        float(tangential_resistance(foot, load, 0.0, sole_film=THICK_FILM)) / load,
-        float(tangential_resistance(foot, load, DOMED * foot.ceiling)) / load,
+        foot.grip(load, 0.0) / load,
+        laws.resistance(foot, 0.0, load, 0.0, 0.0, THICK_FILM) / load,
+        foot.grip(load, pressure) / load,
+        foot.grip(0.5 * load, pressure, film, LANDING) / (0.5 * load),
     )

@@ -21,8 +21,12 @@ FADING_LENGTH = 1.0
 KEPT = 60
 """Number of footprints that are kept."""
 
-DRY = 0.35
-"""Probability of wet ground below which the friction of a flat foot is that of dry ground."""
+DRY, WET = 0.35, 0.65
+"""Probability of wet ground below which the friction of a flat foot is that of dry ground, and
+above which friction is that of wet ground."""
+
+CERTAIN = 0.95
+"""Highest probability of wet ground that makes domes: so their friction is felt again."""
 
 NEW_SHARE = 0.2
 """Weight of the last step in the mean friction of a morphology."""
@@ -67,9 +71,10 @@ class Footprints:
 
 
 class FrictionFelt:
-    """Mean friction of flat feet on dry ground and of domes, from the steps of all legs.
+    """Mean friction of flat feet and of domes, from the steps of all legs.
 
-    The foot file may promise adhesion that this floor does not have.
+    The foot file may promise adhesion that this floor does not have, or domes that drain a film
+    that they do not.
 
     Parameters
     ----------
@@ -83,10 +88,13 @@ class FrictionFelt:
     flat_pays : bool
         Whether flat feet have more friction on dry ground than domes, by the factor :data:`PAYS`;
         once they have, until the factor falls below :data:`PAYS_NOT`.
+    break_even : float
+        Probability of wet ground at which flat feet and domes are expected to have the same
+        friction, 0 to :data:`CERTAIN`.
     """
 
     def __init__(self, foot: Foot, load: float) -> None:
-        self._flat_dry, _, self._dome = expected_friction(foot, load)
+        self._flat_dry, self._flat_wet, self._dome, self._wet_dome = expected_friction(foot, load)
         self.flat_pays = self._flat_dry >= PAYS * self._dome
 
     def add(self, flat: bool, wet_probability: float, friction: float) -> None:
@@ -95,6 +103,16 @@ class FrictionFelt:
             return
         if not flat:
             self._dome += NEW_SHARE * (friction - self._dome)
+            if wet_probability > WET:
+                self._wet_dome += NEW_SHARE * (friction - self._wet_dome)
         elif wet_probability < DRY:
             self._flat_dry += NEW_SHARE * (friction - self._flat_dry)
+        elif wet_probability > WET:
+            self._flat_wet += NEW_SHARE * (friction - self._flat_wet)
         self.flat_pays = self._flat_dry >= (PAYS_NOT if self.flat_pays else PAYS) * self._dome
+
+    @property
+    def break_even(self) -> float:
+        lost = max(self._flat_dry - self._dome, 0.0)
+        won = max(self._wet_dome - self._flat_wet, 1e-9)
+        return min(lost / (lost + won), CERTAIN)

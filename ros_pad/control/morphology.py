@@ -571,6 +571,7 @@ class MorphologyController:
             next_position=ahead,
             others_probing=any(other.probing and other.decided > recent for other in others),
             flat_pays=self.friction.flat_pays,
+            break_even=self.friction.break_even,
         )
         before = state.morphology
         self._apply(state, self._permitted(state, self.policy(step)))

@@ -38,6 +38,9 @@ class LiftOff:
         Whether another leg probes now.
     flat_pays : bool
         Whether flat feet have more friction on dry ground than domes.
+    break_even : float
+        Probability of wet ground, 0 to 1, at which flat feet and domes are expected to have the
+        same friction.
     """
 
     leg: int
@@ -48,6 +51,7 @@ class LiftOff:
     next_position: tuple[float, float]
     others_probing: bool
     flat_pays: bool = True
+    break_even: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -175,12 +179,12 @@ def adaptive(
     def choose(step: LiftOff) -> Choice:
         if not (step.probing or step.steps >= dwell):
             return Choice(step.morphology)
-        wet = step.wet_ahead
+        wet, even = step.wet_ahead, step.break_even
         if step.morphology == FLAT:
-            return Choice(FLAT if wet <= wet_above and step.flat_pays else DOME)
+            return Choice(FLAT if wet <= max(wet_above, even) and step.flat_pays else DOME)
         if wet < dry_below and step.flat_pays:
             return Choice(FLAT)
-        due = wet < probe_below if step.flat_pays else SELDOM <= step.steps < math.inf
+        due = wet < max(probe_below, even) if step.flat_pays else SELDOM <= step.steps < math.inf
         probe = due and not step.others_probing
         return Choice(FLAT if probe else DOME, probe)
 

@@ -20,8 +20,8 @@ import numpy.typing as npt
 from scipy import special
 
 from ros_pad.configuration import instance, number
-from ros_pad.contact.resistance import Foot
-from ros_pad.estimation.scales import EDGES, GRID, Felt, FrictionPrior, FrictionScales
+from ros_pad.contact.resistance import Foot, expected_friction
+from ros_pad.estimation.scales import EDGES, GRID, Felt, FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
@@ -43,10 +43,6 @@ _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARE
 SLOWEST = 0.1
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
 only by the speed at which they turn, which is not known and the same all through a stance."""
-
-DRAINING_TIME = 0.05
-"""Time in which the film under a dome drains at the start of a stance, s: in walks, friction is
-four fifths of that on dry ground after 0.05 to 0.1 s."""
 
 CREEP, CREEP_SPEED, LEAST_PULL = 0.01, 0.025, 0.04
 """Share of the windows of a sticking foot in which it rolls or bends, the mean of its speed then
@@ -163,7 +159,7 @@ class GroundModel:
         instance('foot', foot, Foot)
         instance('tuning', tuning, Tuning)
         number('expected_load', expected_load, 'N', above=True)
-        prior = FrictionPrior.of(foot, expected_load)
+        prior = expected_friction(foot, expected_load)
         return cls(
             FrictionScales(prior, tuning.scales, tuning.learn_friction),
             tuning.wet_prior,
@@ -270,9 +266,6 @@ class GroundFilter:
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self.fade(distance)
-        if dome:
-            self.posterior[1] = self.expected.undrained * self.wet_probability
-            self._normalise(self.posterior)
         self._begin()
 
     @property
@@ -307,8 +300,6 @@ class GroundFilter:
         self._multiply(evidence, shown)
         if sample.speed > 0.0:
             self._move(sample.speed * sample.dt)
-        if self._dome:
-            self._drain(sample.dt)
         self._normalise(self.posterior)
 
     def _multiply(self, evidence: np.ndarray, shown: float) -> None:
@@ -332,15 +323,6 @@ class GroundFilter:
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
         after *= 1.0 / (dry + wet)
         self.posterior = after
-
-    def _drain(self, dt: float) -> None:
-        """Let friction rise on the same ground, as the film under a dome drains for a time, s."""
-        keep, posterior = math.exp(-dt / DRAINING_TIME), self.posterior
-        wet = posterior[1].dot(_ONES)
-        posterior[1] *= keep
-        posterior[1] += (1.0 - keep) * wet * self.expected.dome[1]
-        if self._felt is not None:
-            self._felt[1] *= keep
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""

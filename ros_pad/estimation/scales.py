@@ -13,14 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from scipy import special
 
-from ros_pad.contact.resistance import Foot, expected_friction
+from ros_pad.contact.resistance import ExpectedFriction
 
 EDGES = np.geomspace(0.025, 2.5, 97)
 GRID = np.sqrt(EDGES[:-1] * EDGES[1:])
@@ -50,13 +49,10 @@ TAIL = 0.01
 """Probability of friction of another origin, equal for all cells: unexpected ground stays
 possible, and wet or dry never become certain."""
 
-DRAINED = 0.75
-"""Least friction of a dome on wet ground, over that on dry ground, once its film has drained; any
-factor from this to one is equally likely. Before, friction is anywhere between that of a flat sole
-and that of a dome."""
-
-REWETTED = 0.05
-"""Share of the time after that in which it is so again: the foot has slipped onto fresh liquid."""
+UNDRAINED = 0.05
+"""Probability that the film under a dome has not drained as the contact model has it, for example
+in a fast slip. Its friction is then anywhere between that of a flat sole and that of a dome; else
+over that on dry ground it is any factor from that just after landing to one."""
 
 BEYOND = 0.1
 """Distance of ln(expected friction) from the grid from which on it is moved to the grid's end:
@@ -68,26 +64,6 @@ results do not depend on which of two feet is read first."""
 
 DELAY = 0.1
 """Least time between the end of a stance and its use for other feet, s, likewise."""
-
-
-@dataclass(frozen=True)
-class FrictionPrior:
-    """Friction of a foot by the contact model, for each ground and morphology.
-
-    Attributes
-    ----------
-    flat_dry, flat_wet, dome : float
-        Coefficients of friction.
-    """
-
-    flat_dry: float
-    flat_wet: float
-    dome: float
-
-    @classmethod
-    def of(cls, foot: Foot, load: float) -> FrictionPrior:
-        """Return the friction that the contact model predicts for a foot at a load, N."""
-        return cls(*expected_friction(foot, load))
 
 
 class Scale(NamedTuple):
@@ -138,19 +114,16 @@ class Felt(NamedTuple):
 
 
 class Expected:
-    """Friction that feet expect of new ground, from its probabilities, shape (5, grid).
+    """Friction that feet expect of new ground, from its probabilities, shape (4, grid).
 
     Attributes
     ----------
     flat, dome : array (2, grid)
-        Probabilities on dry and on wet ground, of a dome once its film has drained.
-    undrained : array (grid,)
-        Those of a dome on wet ground before.
+        Probabilities on dry and on wet ground.
     """
 
     def __init__(self, rows: np.ndarray) -> None:
-        self.rows = rows
-        self.flat, self.dome, self.undrained = rows[:2], rows[2:4], rows[4]
+        self.rows, self.flat, self.dome = rows, rows[:2], rows[2:]
 
     @cached_property
     def flat_wet(self) -> float:
@@ -163,7 +136,7 @@ class FrictionScales:
 
     Parameters
     ----------
-    prior : FrictionPrior
+    prior : ExpectedFriction
         Friction by the contact model.
     scales : mapping
         What is known of scales before the walk: a :class:`Scale` by class; a class that is left
@@ -173,13 +146,13 @@ class FrictionScales:
 
     Attributes
     ----------
-    prior : FrictionPrior
+    prior : ExpectedFriction
         As given.
     """
 
     def __init__(
         self,
-        prior: FrictionPrior,
+        prior: ExpectedFriction,
         scales: Mapping[str, Scale] | None = None,
         learns: bool = True,
     ) -> None:
@@ -205,7 +178,8 @@ class FrictionScales:
             between[np.abs(GRID - ends[0]).argmin()] = 1
         undrained = np.clip(between, 1e-3, 1.0)
         self._undrained = undrained / undrained.sum()
-        cells = round(math.log(1.0 / DRAINED) / math.log(GRID[1] / GRID[0])) + 1
+        landed = max(prior.landed, GRID[0]) / max(prior.dome, GRID[0])
+        cells = max(0, round(-math.log(landed) / math.log(GRID[1] / GRID[0]))) + 1
         self._films = np.tri(len(GRID)).T - np.tri(len(GRID), k=-cells).T
         self._films /= self._films.sum(axis=0)
         self._felt: list[Felt] = []
@@ -258,8 +232,8 @@ class FrictionScales:
         dry, wet, dome = (
             weights.dot(table) for weights, table in zip(self._weights, self._tables, strict=True)
         )
-        drained = (1.0 - REWETTED) * self._films.dot(dome) + REWETTED * self._undrained
-        return Expected(np.array([dry, wet, dome, drained, self._undrained]))
+        on_wet = (1.0 - UNDRAINED) * self._films.dot(dome) + UNDRAINED * self._undrained
+        return Expected(np.array([dry, wet, dome, on_wet]))
 
     def _update(self, begin: float, end: float) -> None:
         """Use the stances between two times, s, sorted: feet may be read in any order."""
@@ -278,8 +252,8 @@ class FrictionScales:
         dry, wet = 1.0 - felt.wet, felt.wet
         if felt.dome:
             dries = self._tables[2].dot(on_dry)
-            wets = (1.0 - REWETTED) * self._tables[2].dot(on_wet.dot(self._films))
-            wets += REWETTED * self._undrained.dot(on_wet)
+            wets = (1.0 - UNDRAINED) * self._tables[2].dot(on_wet.dot(self._films))
+            wets += UNDRAINED * self._undrained.dot(on_wet)
             if_dry, if_wet = self._weights[2].dot(dries), self._weights[2].dot(wets)
             self._multiply(felt, 2, dry * dries / if_dry + wet * wets / if_wet)
             return

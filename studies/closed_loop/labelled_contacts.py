@@ -24,13 +24,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import Foot, expected_friction
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.alarm import SLOW_SLIP, SMOOTHING, SPEED_NOISE, SlipAlarm
 from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
 from ros_pad.estimation.ground import RATIO_NOISE
-from ros_pad.estimation.scales import FrictionPrior, FrictionScales
+from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.track import LOAD_GATE
 from studies import command
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
@@ -276,7 +276,7 @@ def least_friction(recording: Recording) -> np.ndarray:
     The slip speed is not measured: the filter gets zero with a standard deviation of 1 m/s. Each
     stance is on new ground, and T/N that does not change has no weight, as in FootEstimator.
     """
-    prior = FrictionPrior.of(Foot.load('large37'), 6.8)
+    prior = expected_friction(Foot.load('large37'), 6.8)
     ground = GroundFilter(GroundModel(FrictionScales(prior, learns=False)))
     noise = RATIO_NOISE
     window = round(Tuning().filter_period / PERIOD)

@@ -9,14 +9,14 @@ import math
 import numpy as np
 import pytest
 
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import Foot, expected_friction
 from ros_pad.estimation import FootEstimator, Tuning
-from ros_pad.estimation.scales import FrictionPrior, Scale
+from ros_pad.estimation.scales import Scale
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
 PERIOD = 0.004  # s
-PRIOR = FrictionPrior.of(FOOT, LOAD)
+PRIOR = expected_friction(FOOT, LOAD)
 LEVER = 2.0 / 3.0 * FOOT.sole_radius
 
 

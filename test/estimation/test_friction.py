@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import ExpectedFriction, Foot, expected_friction
 from ros_pad.estimation.friction import GRID, Evidence, GroundFilter, GroundModel
-from ros_pad.estimation.scales import EDGES, FrictionPrior, FrictionScales
+from ros_pad.estimation.scales import EDGES, FrictionScales
 
-PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
+PRIOR = ExpectedFriction(flat_dry=0.8, flat_wet=0.12, dome=0.41, landed=0.32)
 STILL = 0.0  # m/s
 DT = 0.04
 EXACT = 1e-5  # a model error too small to have an effect on any cell of the grid
@@ -44,7 +44,7 @@ def slip(ground, ratio, count=5, speed=0.1):
 
 def test_the_prior_is_the_contact_model_of_the_foot():
     """Friction is that of the foot's file: 0.8 flat and 0.41 domed if dry, 0.12 flat if wet."""
-    prior = FrictionPrior.of(Foot.load('large19'), 2.0)
+    prior = expected_friction(Foot.load('large19'), 2.0)
     assert prior.flat_dry == pytest.approx(0.8, abs=0.005)
     assert prior.flat_wet == pytest.approx(0.12, abs=1e-6)
     assert prior.dome == pytest.approx(0.41, abs=0.01)

@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import Foot, expected_friction
 from ros_pad.estimation.foot import Tuning
-from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
@@ -144,7 +143,7 @@ def pull(scene: Scene, duration: float, seed: int) -> Recording:
     period, load, foot = 1.0 / scene.sensors.rate, scene.expected_load, scene.foot
     generator = np.random.default_rng([seed, 5])
     stamps = period * np.arange(1, round(duration / period) + 1, dtype=np.float64)
-    friction = FrictionPrior.of(foot, load).flat_dry
+    friction = expected_friction(foot, load).flat_dry
     amplitude, cycle = friction * np.linspace(0.2, 0.6, 6), np.linspace(1.2, 0.3, 6)
     pulled = np.maximum(0.0, stamps[:, None] - SETTLED)
     shape = (len(stamps), 6, 3)
