@@ -91,9 +91,6 @@ class FrictionFelt:
     flat_pays : bool
         Whether flat feet have more friction on dry ground than domes, by the factor :data:`PAYS`;
         once they have, until the factor falls below :data:`PAYS_NOT`.
-    break_even : float
-        Probability of wet ground at which flat feet and domes are expected to have the same
-        friction, but for :data:`CHANCE`; 0 to :data:`CERTAIN`.
     """
 
     def __init__(self, foot: Foot, load: float) -> None:
@@ -116,6 +113,10 @@ class FrictionFelt:
 
     @property
     def break_even(self) -> float:
+        """Probability of wet ground at which flat feet and domes are expected to hold alike.
+
+        From 0 to :data:`CERTAIN`; on wet ground domes must hold more by :data:`CHANCE`.
+        """
         lost = max(self._flat_dry - self._dome, 0.0)
         won = max(self._wet_dome - CHANCE * self._flat_wet, 1e-9)
         return min(lost / (lost + won), CERTAIN)

@@ -5,9 +5,8 @@ Walks variants of ``hexapod_patches`` with full dynamics (L2). Everything was tu
 grounds (``--tune``, at most nine settings a policy) and is compared on
 grounds that differ from them in a condition: patch length, wet share, film, towed load,
 friction of the feet. Then on grounds where adapting cannot win, or where the foot's file is
-wrong, and with fixed shapes at slower gaits. Every gain has a 95 % bootstrap interval over floors, the
-main one over conditions, too.
-Writes policies.json and .png, and the tables of docs/model/policies.md.
+wrong, and with fixed shapes at slower gaits. Every gain has a 95 % bootstrap interval over floors,
+the main one over conditions, too. Writes policies.json and .png, and the tables of docs/model/policies.md.
 """
 
 from __future__ import annotations
@@ -359,7 +358,7 @@ def overall(document: Mapping[str, Any]) -> str:
     clusters = document['held out']['clusters']
     lines += [
         '',
-        'Gain of the adaptive policy over the better fixed shape of each floor, 95 %, over clusters'
+        'Gain of the adaptive policy over the better fixed shape of each floor, 95 % over clusters'
         f' of conditions: {clusters["low"]:.3f} to {clusters["high"]:.3f}. On `{SCENE}` with one'
         f' assumed number halved or doubled: {min(found):.2f} to {max(found):.2f}, nine of ten'
         f' {np.quantile(found, 0.05):.2f} to {np.quantile(found, 0.95):.2f}.',
