@@ -6,7 +6,8 @@ grounds (``--tune``, at most nine settings a policy) and is compared on
 grounds that differ from them in a condition: patch length, wet share, film, towed load,
 friction of the feet. Then on grounds where adapting cannot win, or where the foot's file is
 wrong, and with fixed shapes at slower gaits. Every gain has a 95 % bootstrap interval over floors,
-the main one over conditions, too. Writes policies.json and .png, and the tables of docs/model/policies.md.
+the main one over conditions, too. Writes policies.json and .png, and the tables of
+docs/model/policies.md.
 """
 
 from __future__ import annotations
