@@ -100,7 +100,7 @@ SETTINGS: dict[str, list[tuple[Any, ...]]] = {
 
 RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
     'each 8 steps': ('count', (8,)),
-    'POMDP': ('pomdp', (0.3, 0.75)),
+    'POMDP': ('pomdp', (1.0, 1.5)),
     'discounted UCB': ('discounted_ucb', (0.8, 0.05)),
 }
 """Rivals with the settings that were best on the tuning grounds."""
