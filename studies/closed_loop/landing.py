@@ -22,6 +22,7 @@ from unittest.mock import patch
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ros_pad.contact import laws
 from ros_pad.contact.pad import DOME_PRESSURE
@@ -351,7 +352,8 @@ def table(document: Mapping[str, Any]) -> str:
     ])  # fmt: skip
 
 
-COLOURS = (BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION)
+_NAMES = list(dict.fromkeys(name for grounds in GROUNDS.values() for name in grounds))
+COLOURS = dict(zip(_NAMES, (BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION), strict=True))
 
 
 def _ends(each: Mapping[str, Any], of_ratio: bool) -> tuple[float, ...] | None:
@@ -379,16 +381,17 @@ def _column(panels: Sequence[Axes], robot: Mapping[str, Any], scene: str) -> Non
                 ends = _ends(rows[name][policy][landing], of_ratio)
                 if ends and not (of_ratio and landing == 'usual'):
                     at = place + 0.13 * (index - 0.5 * (len(names) - 1))
-                    face = 'white' if part == 'tuning' else COLOURS[index]
-                    panel.plot([at, at], ends[1:], color=COLOURS[index], lw=1.2)
-                    panel.plot(at, ends[0], 'o', color=COLOURS[index], mfc=face, ms=4)
+                    face = 'white' if part == 'tuning' else COLOURS[name]
+                    panel.plot([at, at], ends[1:], color=COLOURS[name], lw=1.2)
+                    panel.plot(at, ends[0], 'o', color=COLOURS[name], mfc=face, ms=4)
     for panel in panels:
         panel.axvline(len(speeds) + 0.5, color='0.8', lw=0.8, zorder=0)
         panel.set_xticks(range(len(groups)), ticks)
         panel.set_xlim(-0.5, len(groups) - 0.5)
     for panel in panels[1:]:
         panel.axhline(1.0, color='0.6', lw=0.8, zorder=0)
-    panels[0].set_title(scene)
+    panels[0].set_title(f'{scene}, tuning floors')
+    panels[0].set_title('other floors', loc='right')
     panels[-1].set_xlabel('speed of lowering, mm/s (of touch-down)')
 
 
@@ -401,10 +404,15 @@ def draw(document: Mapping[str, Any]) -> Figure:
             _column(panels[:, column], robot, scene)
         for panel, text in zip(
             panels[:, 0],
-            ('dry share under wet domes', *(f'{each}: distance to usual' for each in POLICIES)),
+            ('dry share under wet domes', *(f'{each}: distance, to usual' for each in POLICIES)),
             strict=True,
         ):
             panel.set_ylabel(text)
+        handles = [
+            Line2D([], [], color=colour, marker='o', ms=4, label=name)
+            for name, colour in COLOURS.items()
+        ]
+        figure.legend(handles=handles, loc='outside lower center', ncols=3)
     return figure
 
 
