@@ -391,7 +391,7 @@ def _column(panels: Sequence[Axes], robot: Mapping[str, Any], scene: str) -> Non
     for panel in panels[1:]:
         panel.axhline(1.0, color='0.6', lw=0.8, zorder=0)
     panels[0].set_title(f'{scene}, tuning floors')
-    panels[0].set_title('other floors', loc='right')
+    panels[0].set_title('held out', loc='right')
     panels[-1].set_xlabel('speed of lowering, mm/s (of touch-down)')
 
 
