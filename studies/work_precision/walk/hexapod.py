@@ -93,7 +93,7 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     return [*walkers, *tops], tuple(top.name for top in tops), baseline
 
 
-TOP, DRAKE = 'L2, top', 'Drake, force elements'
+TOP, DRAKE = 'L2, top', 'Drake'
 
 
 def _planar(family: str, step: float, compiled: bool) -> Walker:
@@ -118,7 +118,8 @@ def _full(family: str, settings: SolverSettings, ours: bool = True) -> Walker:
 
 def _drake(step: float) -> Walker:
     def make(case: Walk) -> DrakeRobot:
-        return DrakeRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, step)
+        floor = case.scene.floor.build(case.seed)
+        return DrakeRobot(case.scene, floor, SAMPLE, step, case.pressure)
 
     return _sampled(DRAKE, step, make, False)
 
