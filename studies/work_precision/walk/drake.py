@@ -11,6 +11,7 @@ and turning share, as on L1 and L2.
 from __future__ import annotations
 
 import importlib
+import logging
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -92,6 +93,7 @@ class DrakeRobot:
         self._place()
 
     def _tools(self) -> None:
+        logging.getLogger('drake').setLevel(logging.ERROR)  # half-spaces do not deform: as wanted
         self._math, self._tree = _drake('math'), _drake('multibody.tree')
         self._plants = _drake('multibody.plant')
         self._framework, self._geometry = _drake('systems.framework'), _drake('geometry')
@@ -104,9 +106,7 @@ class DrakeRobot:
         self._plant, graph = self._plants.AddMultibodyPlantSceneGraph(builder, self._dt)
         plant, slope = self._plant, scene.floor.slope
         plant.set_contact_model(self._plants.ContactModel.kPoint)
-        plant.set_discrete_contact_approximation(
-            self._plants.DiscreteContactApproximation.kLagged
-        )
+        plant.set_discrete_contact_approximation(self._plants.DiscreteContactApproximation.kLagged)
         plant.mutable_gravity_field().set_gravity_vector(
             [-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)]
         )

@@ -16,6 +16,7 @@ from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Scene
 from studies.work_precision.walk.drake import DrakeRobot
+from studies.work_precision.walk.unlanded import stock, unlanded
 from studies.work_precision.walk.walkers import (
     CYCLES,
     HEXAPOD,
@@ -30,6 +31,7 @@ SETTLE = 0.2  # s: the hexapod stands for this time first
 SAMPLE = 4e-3  # s: time between set-points of the servos of L2
 TOP_STEP = 2.5e-4  # s
 MUJOCO_DEFAULTS = SolverSettings(integrator='Euler', cone='pyramidal', impratio=1.0)
+UNLANDED = SolverSettings(impratio=100.0)  # creeps as little with MuJoCo's own contact
 
 
 def hexapod_walks() -> list[Walk]:
@@ -79,9 +81,11 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     steps = (5e-4, 1e-3, 2e-3, 4e-3)
     walkers += [_full('L2', replace(RECOMMENDED, timestep=step)) for step in steps]
     walkers += [
-        _full('MuJoCo defaults', replace(MUJOCO_DEFAULTS, timestep=step), ours=False)
+        stock(_full('MuJoCo defaults', replace(MUJOCO_DEFAULTS, timestep=step), ours=False))
         for step in (5e-4, 2e-3)
     ]
+    plain = [_full('L2', replace(UNLANDED, timestep=step)) for step in (1e-3, 2e-3, 4e-3)]
+    walkers += [unlanded(walker) for walker in (_planar('L1', SAMPLE, False), *plain)]
     baseline = named('L2', RECOMMENDED.timestep)
     if importlib.util.find_spec('pydrake'):
         tops: tuple[Walker, ...] = (_full(TOP, replace(RECOMMENDED, timestep=1e-4)), _drake(1e-4))
