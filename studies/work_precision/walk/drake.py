@@ -93,10 +93,10 @@ class DrakeRobot:
         self._place()
 
     def _tools(self) -> None:
-        logging.getLogger('drake').setLevel(logging.ERROR)  # half-spaces do not deform: as wanted
         self._math, self._tree = _drake('math'), _drake('multibody.tree')
         self._plants = _drake('multibody.plant')
         self._framework, self._geometry = _drake('systems.framework'), _drake('geometry')
+        logging.getLogger('drake').setLevel(logging.ERROR)  # half-spaces do not deform: as wanted
 
     # --- model --------------------------------------------------------------------------------
 
