@@ -84,6 +84,9 @@ class DrakeRobot:
         self._steps = 0
         self._foot = scene.foot.on_rough(scene.floor.roughness)
         self._lever, self._pressure = self._foot.turning_radius, pressure
+        expected, place = scene.expected_load / GRAVITY, DOMED / self._foot.limit_cell
+        stiffness = laws.between(self._foot.stiffnesses, place * self._foot.ceiling)
+        self._loss = LOSS * math.sqrt(stiffness / expected) / GRAVITY
         self._films = [Film(self._foot, scene.floor.viscosity) for _ in self.legs]
         self._solver = FeetSolver(body.robot)
         gait: Any = scene.gait
@@ -115,14 +118,18 @@ class DrakeRobot:
         )
         self._joints: list[Any] = []
         self._blocks: list[Any] = []  # joints on which the ground below a foot moves up and down
+        self._grounds: list[list[Any]] = []  # shapes that may touch each other
         if self._floor.heights is None:
             self._add_ground(plant.world_body())
-        self._bodies: dict[Any, int] = {}
         self._tips = [self._add_leg(leg) for leg in range(len(self.legs))]
         if scene.tow.weight:
             self._add_sled()
         plant.Finalize()
-        self._part_blocks(graph)
+        rules, some = self._geometry.CollisionFilterDeclaration(), self._geometry.GeometrySet
+        for number, ground in enumerate(self._grounds):
+            for other in self._grounds[:number]:  # a foot touches its own ground only
+                rules.ExcludeBetween(some(ground), some(other))
+        graph.collision_filter_manager().Apply(rules)
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
         self._context = plant.GetMyMutableContextFromRoot(self._root)
@@ -166,59 +173,37 @@ class DrakeRobot:
 
     def _add_point(self, leg: int, link: Any, tip: Array) -> None:
         """Add the point of a foot, and on uneven floors the ground below it."""
-        plant, tree, raised = self._plant, self._tree, tip.copy()
-        raised[2, 3] += POINT
-        sphere = self._geometry.Sphere(POINT)
-        plant.RegisterCollisionGeometry(
-            link, self._transform(raised), sphere, f'point_{leg}', self._material(_RIGID)
-        )
-        self._bodies[link.index()] = leg
+        plant, tree, shape = self._plant, self._tree, self._geometry.Sphere(POINT)
         if self._floor.heights is not None:
             cube = tree.SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
             block = plant.AddRigidBody(f'block_{leg}', cube)
             frames = plant.world_frame(), block.body_frame()
-            self._blocks.append(
-                plant.AddJoint(tree.PrismaticJoint(f'block_{leg}', *frames, np.eye(3)[2]))
-            )
+            joint = tree.PrismaticJoint(f'block_{leg}', *frames, np.eye(3)[2])
+            self._blocks.append(plant.AddJoint(joint))
             self._add_ground(block)
+        point = plant.RegisterCollisionGeometry(
+            link, self._transform(tip), shape, f'point_{leg}', self._material(_RIGID)
+        )
+        self._grounds[-1].append(point)
 
     def _material(self, stiffness: float) -> Any:
         """Return what Drake's contact has to know of a surface; its own friction is off."""
-        expected = self._scene.expected_load / GRAVITY
-        place = DOMED * self._foot.ceiling / self._foot.limit_cell
-        loss = LOSS * math.sqrt(laws.between(self._foot.stiffnesses, place) / expected) / GRAVITY
-        material = self._geometry.ProximityProperties()
-        none = self._plants.CoulombFriction(0.0, 0.0)
-        self._geometry.AddContactMaterial(material, loss, stiffness, none)
+        material, none = self._geometry.ProximityProperties(), self._plants.CoulombFriction()
+        self._geometry.AddContactMaterial(material, self._loss, stiffness, none)
         return material
 
     def _add_ground(self, body: Any) -> None:
         """Add the ground: from its surface on as stiff as the pads, deeper down as the sole."""
-        foot, down, sole = self._foot, 0.0, self._foot.sole_stiffness
-        layers = [(0.0, laws.spring(foot, 0.0, self._pressure)[1])]
-        if layers[0][1] < sole:
-            down = foot.dome_load(math.inf, self._pressure) / layers[0][1]
-            layers.append((-down, sole - layers[0][1]))
-        for height, stiffness in layers:
-            pose = self._math.RigidTransform([0.0, 0.0, height])
-            space, name = self._geometry.HalfSpace(), f'{body.name()}, {height:g} m'
-            self._plant.RegisterCollisionGeometry(
-                body, pose, space, name, self._material(stiffness)
-            )
-
-    def _part_blocks(self, graph: Any) -> None:
-        """Let each foot touch its own block only."""
-        plant, named = self._plant, self._geometry.GeometrySet
-        links = {leg: plant.get_body(index) for index, leg in self._bodies.items()}
-        rules = self._geometry.CollisionFilterDeclaration()
-        shapes = [
-            plant.GetCollisionGeometriesForBody(joint.child_body()) for joint in self._blocks
-        ]
-        for leg, own in enumerate(shapes):
-            others = [each for part in shapes if part is not own for each in part]
-            points = plant.GetCollisionGeometriesForBody(links[leg])
-            rules.ExcludeBetween(named([*own, *points]), named(others))
-        graph.collision_filter_manager().Apply(rules)
+        foot, sole, self._grounds = self._foot, self._foot.sole_stiffness, [*self._grounds, []]
+        stiffness = laws.spring(foot, 0.0, self._pressure)[1]
+        layers = [(0.0, stiffness)]
+        if stiffness < sole:
+            down = foot.dome_load(math.inf, self._pressure) / stiffness
+            layers.append((down, sole - stiffness))
+        for depth, more in layers:
+            pose = self._math.RigidTransform([0.0, 0.0, -depth - POINT])
+            given = self._geometry.HalfSpace(), f'{body.name()}, {depth:g} m', self._material(more)
+            self._grounds[-1].append(self._plant.RegisterCollisionGeometry(body, pose, *given))
 
     def _add_sled(self) -> None:
         """Add the towed load: a point that does not turn."""
@@ -380,10 +365,11 @@ class DrakeRobot:
         jacobians = np.array([self._jacobian(frame)[2:] for frame in frames])  # yaw, x, y, z
         speeds = jacobians @ plant.GetVelocities(context)
         places = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
-        # That of the sled; the feet have Drake's contact.
         loads = np.maximum(-STIFFNESS * places[:, 2] - DAMPING * speeds[:, 3], 0.0)
-        loads = np.where(places[:, 2] < 0.0, loads, 0.0)
-        loads[:count] = self._pressed()
+        for index, depth in enumerate((self._ground - places[:count, 2]).tolist()):
+            spring, _ = laws.spring(self._foot, max(0.0, depth), self._pressure)
+            loads[index] = spring * max(0.0, 1.0 - self._loss * speeds[index, 3])
+        loads[places[:, 2] >= np.append(self._ground, [0.0] * (len(frames) - count))] = 0.0
         levers = np.full(len(frames), self._lever)
         levers[count:] = 0.0
         slides = np.column_stack([speeds[:, 1:3], levers * speeds[:, 0]])
@@ -401,21 +387,9 @@ class DrakeRobot:
         push[slips] *= (caps[slips] / np.maximum(size[slips], 1e-30))[:, None]
         self._shear[slips] = -push[slips] / STIFFNESS
         wrench = np.column_stack([levers * push[:, 2], push[:, :2], loads])
-        wrench[:count, 3] = 0.0
+        wrench[:count, 3] = 0.0  # Drake's contact presses the feet
         force += np.einsum('ijk,ij->k', jacobians, wrench)
         self._loads = loads
-
-    def _pressed(self) -> Array:
-        """Return the loads of the feet in the last step, N."""
-        loads = np.zeros(len(self._tips))
-        found = self._plant.get_contact_results_output_port().Eval(self._context)
-        for number in range(found.num_point_pair_contacts()):
-            pair = found.point_pair_contact_info(number)
-            index = self._bodies.get(pair.bodyA_index())
-            if index is None:
-                index = self._bodies[pair.bodyB_index()]
-            loads[index] += abs(pair.contact_force()[2])
-        return loads
 
     def _update_feet(self) -> None:
         """Count slip as L2 does, and prepare film and ground below feet in the air."""
