@@ -267,7 +267,7 @@ def threshold() -> list[Outcome]:
 
 # --- c, d: the spring and the damper of a foot ---------------------------------------------------
 
-STEPS = tuple(float(dt) for dt in np.geomspace(5e-5, 2e-2, 14))
+STEPS = (5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 LANDS = 0.1  # m/s
 STANDS = Case('stiff damped foot', 'step, s', 'load off the weight, share', 0.01, 1e-6, 100.0)
 BOUNCES = Case(
@@ -380,7 +380,7 @@ def feet() -> list[Outcome]:
 
 # --- e: a light block on a spring ----------------------------------------------------------------
 
-BLOCKS = tuple(float(mass) for mass in np.geomspace(5e-3, 30.0, 12))  # kg
+BLOCKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)  # kg
 SERIES = Case(
     'light block in series',
     'mass of the block, kg',
