@@ -64,14 +64,13 @@ class Case:
         law: Callable[[float], float | None] | float | None = None, limit: float | None = None,
     ) -> list[Outcome]:  # fmt: skip
         """Return the outcomes of a method for many inputs."""
-        found = [(at, value(at)) for at in inputs]
         return [
             Outcome(
                 case=self.name, method=method, ours=ours, input=self.input, at=at,
                 measure=self.measure, value=each if math.isfinite(each) else None,
                 law=law(at) if callable(law) else law, fails=not each <= self.worst, limit=limit,
             )
-            for at, each in found
+            for at, each in zip(inputs, map(value, inputs), strict=True)
         ]  # fmt: skip
 
 
@@ -287,14 +286,14 @@ _FOOT = """
 </mujoco>
 """
 _FLOOR = '<geom name="floor" type="plane" size="9 9 1" contype="0"/>'
-Motion = tuple[float, float, float]  # height, m, speed, m/s, and load, N
-Advance = Callable[[float, float], Motion]
+# Of height, m, and speed, m/s, to those after a step, and the load, N.
+Advance = Callable[[float, float], tuple[float, float, float]]
 
 
 def by_euler(dt: float, pressure: float, loss: float, gravity: float, late: bool) -> Advance:
     """Return a step of a foot by explicit Euler; ``late``: places move at the new speed."""
 
-    def advance(height: float, speed: float) -> Motion:
+    def advance(height: float, speed: float) -> tuple[float, float, float]:
         force, _ = laws.spring(_SCENE.foot, max(0.0, -height), pressure)
         load = max(0.0, force * (1.0 - loss * speed))
         then = speed + dt * (load / _CARRIED - gravity)
@@ -313,7 +312,7 @@ def by_row(dt: float, pressure: float, loss: float, gravity: float) -> Advance:
     soles: Any = SimpleNamespace(foot=_SCENE.foot, _dt=dt, _loss=loss)
     sole.pressure = pressure
 
-    def advance(height: float, speed: float) -> Motion:
+    def advance(height: float, speed: float) -> tuple[float, float, float]:
         data.qpos[0], data.qvel[0] = height, speed
         Soles._give_way(soles, sole, max(0.0, -height))
         mujoco.mj_step(model, data)
@@ -412,8 +411,8 @@ def sunk(scene: Scene, block: float) -> float:
     import mujoco
 
     stiffness, mass = laws.spring(scene.foot, 0.0, 75e3)[1], scene.expected_load / GRAVITY
-    damping = 2.0 * math.sqrt(stiffness * mass)
-    floor = _BLOCK_ON_SPRING.format(stiffness=stiffness, damping=damping, block=block)
+    given = {'stiffness': stiffness, 'damping': 2.0 * math.sqrt(stiffness * mass)}
+    floor = _BLOCK_ON_SPRING.format(block=block, **given)
     text = _FOOT.format(dt=2e-4, gravity=GRAVITY, floor=floor, mass=mass)
     data = mujoco.MjData(model := mujoco.MjModel.from_xml_string(text))
     mujoco.mj_step(model, data, 20_000)

@@ -38,7 +38,6 @@ _SHALLOW = 5e-3  # m above the ground: below it the height of the ground under a
 _THIN = 0.02  # inertia of a rod about its own axis, over that across it, as on L2
 STIFFNESS, DAMPING = 1e5, 200.0
 """Of the ground below a towed load, and of feet in shear, N/m and N s/m."""
-_RIGID = 1e12  # N/m: of the points of the feet, so that the ground has all of a foot's compliance
 
 
 def _drake(module: str) -> Any:
@@ -84,9 +83,9 @@ class DrakeRobot:
         self._steps = 0
         self._foot = scene.foot.on_rough(scene.floor.roughness)
         self._lever, self._pressure = self._foot.turning_radius, pressure
-        expected, place = scene.expected_load / GRAVITY, DOMED / self._foot.limit_cell
-        stiffness = laws.between(self._foot.stiffnesses, place * self._foot.ceiling)
-        self._loss = LOSS * math.sqrt(stiffness / expected) / GRAVITY
+        place = DOMED * self._foot.ceiling / self._foot.limit_cell
+        inertial = scene.expected_load * GRAVITY
+        self._loss = LOSS * math.sqrt(laws.between(self._foot.stiffnesses, place) / inertial)
         self._films = [Film(self._foot, scene.floor.viscosity) for _ in self.legs]
         self._solver = FeetSolver(body.robot)
         gait: Any = scene.gait
@@ -133,8 +132,6 @@ class DrakeRobot:
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
         self._context = plant.GetMyMutableContextFromRoot(self._root)
-        for block in self._blocks:
-            block.Lock(self._context)
         self._places = np.array([joint.position_start() for joint in self._joints])
         self._speeds = np.array([joint.velocity_start() for joint in self._joints])
         self._weigh_trunk()
@@ -172,7 +169,10 @@ class DrakeRobot:
         return plant.AddFrame(tree.FixedOffsetFrame(f'foot_{leg}', parent, self._transform(tip)))
 
     def _add_point(self, leg: int, link: Any, tip: Array) -> None:
-        """Add the point of a foot, and on uneven floors the ground below it."""
+        """Add the point of a foot, and on uneven floors the ground below it.
+
+        The point is rigid: the ground has all of the compliance.
+        """
         plant, tree, shape = self._plant, self._tree, self._geometry.Sphere(POINT)
         if self._floor.heights is not None:
             cube = tree.SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
@@ -182,7 +182,7 @@ class DrakeRobot:
             self._blocks.append(plant.AddJoint(joint))
             self._add_ground(block)
         point = plant.RegisterCollisionGeometry(
-            link, self._transform(tip), shape, f'point_{leg}', self._material(_RIGID)
+            link, self._transform(tip), shape, f'point_{leg}', self._material(1e12)
         )
         self._grounds[-1].append(point)
 
@@ -250,6 +250,7 @@ class DrakeRobot:
         self._ground = np.array([self._floor.height(x, y) for x, y, _ in feet])
         for block, height in zip(self._blocks, self._ground.tolist(), strict=False):
             block.set_translation(context, height)
+            block.Lock(context)
         plant.SetFreeBodyPose(
             context, self._trunk, self._math.RigidTransform([0.0, 0.0, self._ground.max() - low])
         )
@@ -365,11 +366,11 @@ class DrakeRobot:
         jacobians = np.array([self._jacobian(frame)[2:] for frame in frames])  # yaw, x, y, z
         speeds = jacobians @ plant.GetVelocities(context)
         places = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
-        loads = np.maximum(-STIFFNESS * places[:, 2] - DAMPING * speeds[:, 3], 0.0)
+        loads = -STIFFNESS * places[:, 2] - DAMPING * speeds[:, 3]  # of the sled
+        loads = np.where(places[:, 2] < 0.0, np.maximum(loads, 0.0), 0.0)
         for index, depth in enumerate((self._ground - places[:count, 2]).tolist()):
             spring, _ = laws.spring(self._foot, max(0.0, depth), self._pressure)
             loads[index] = spring * max(0.0, 1.0 - self._loss * speeds[index, 3])
-        loads[places[:, 2] >= np.append(self._ground, [0.0] * (len(frames) - count))] = 0.0
         levers = np.full(len(frames), self._lever)
         levers[count:] = 0.0
         slides = np.column_stack([speeds[:, 1:3], levers * speeds[:, 0]])

@@ -14,15 +14,13 @@ from ros_pad.simulation.soles import Sole, Soles
 from studies.work_precision.walk.walkers import Walk, Walked, Walker, named
 
 
-def drained(
-    foot: Any, film: Any, on_domes: float, on_sole: float, pressure: float, time: float,
-    slip: float,
-) -> tuple[float, float]:  # fmt: skip
+def drained(foot: Any, film: Any, *given: float) -> tuple[float, float]:
     """Drain a film as rigid discs do; arguments and result are those of ``laws.drained``.
 
     Where the contact of a dome grows, the new area has the film of touch-down, and 1/h² is
     averaged over the area: it is what ``film[laws.CORE]`` has here.
     """
+    on_domes, on_sole, pressure, time, _ = given
     if film[laws.FRESH] <= 0.0:
         return 0.0, 0.0
     fresh = film[laws.FRESH] ** -2
