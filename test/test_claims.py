@@ -23,7 +23,7 @@ def names():
         path.stem: json.loads(path.read_text(encoding='utf-8'))
         for path in (ROOT / 'docs' / 'charts').glob('*.json')
     }
-    functions = (abs, any, int, len, max, min, round)
+    functions = (abs, any, int, len, max, min, round, sum, zip)
     return charts | {
         '__builtins__': {function.__name__: function for function in functions},
         'log10': math.log10,

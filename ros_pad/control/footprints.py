@@ -25,7 +25,10 @@ DRY, WET = 0.35, 0.65
 """Probability of wet ground below which the friction of a flat foot is that of dry ground, and
 above which friction is that of wet ground."""
 
-CERTAIN = 0.95
+CHANCE = 1.1
+"""Friction of domes on wet ground over that of flat feet that may be chance: no gain."""
+
+CERTAIN = 0.98
 """Highest probability of wet ground that makes domes: so their friction is felt again."""
 
 NEW_SHARE = 0.2
@@ -88,9 +91,6 @@ class FrictionFelt:
     flat_pays : bool
         Whether flat feet have more friction on dry ground than domes, by the factor :data:`PAYS`;
         once they have, until the factor falls below :data:`PAYS_NOT`.
-    break_even : float
-        Probability of wet ground at which flat feet and domes are expected to have the same
-        friction, 0 to :data:`CERTAIN`.
     """
 
     def __init__(self, foot: Foot, load: float) -> None:
@@ -113,6 +113,10 @@ class FrictionFelt:
 
     @property
     def break_even(self) -> float:
+        """Probability of wet ground at which flat feet and domes are expected to hold alike.
+
+        From 0 to :data:`CERTAIN`; on wet ground domes must hold more by :data:`CHANCE`.
+        """
         lost = max(self._flat_dry - self._dome, 0.0)
-        won = max(self._wet_dome - self._flat_wet, 1e-9)
+        won = max(self._wet_dome - CHANCE * self._flat_wet, 1e-9)
         return min(lost / (lost + won), CERTAIN)

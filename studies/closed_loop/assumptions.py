@@ -38,7 +38,7 @@ from ros_pad.estimation import Tuning, alarm, friction, ground, track
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
-from ros_pad.simulation import Scene
+from ros_pad.simulation import Scene, soles
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
@@ -73,6 +73,7 @@ class Setup:
     tuning: Tuning = field(default_factory=Tuning)
     limit_error: float = 1.0  # factor on the force limit of the simulated pads
     load_error: float = 1.0  # factor on the load that estimator and controller expect
+    loss: float = soles.LOSS
     constants: dict[str, float] = field(
         default_factory=lambda: {name: getattr(module, name) for name, module in CONSTANTS.items()}
     )
@@ -118,6 +119,7 @@ class Assumption:
             'controller',
             'limit_error',
             'load_error',
+            'loss',
         )
 
 
@@ -142,6 +144,8 @@ ASSUMPTIONS = (
                'world.foot.boundary_friction', 'boundary friction', ''),
     Assumption(FOOT + 'critical_film', 'world.foot.critical_film', 'critical film', 'm'),
     Assumption(FOOT + 'film_exponent', 'world.foot.film_exponent', 'film exponent', ''),
+    Assumption(FOOT + 'sole_thickness', 'world.foot.sole_thickness', 'thickness of the sole', 'm'),
+    Assumption('simulation/soles.py: LOSS', 'loss', 'loss factor of a foot', ''),
     Assumption(FOOT + 'shear_stiffness', 'world.foot.shear_stiffness', 'shear stiffness', 'N/m'),
     Assumption(FOOT + 'chamber_volume', 'world.foot.chamber_volume', 'chamber volume', 'm3'),
     Assumption(ROBOT + 'mass', 'both.body.mass', 'robot mass', 'kg', 'mass'),
@@ -277,6 +281,7 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     with ExitStack() as changes:
         for name, value in setup.constants.items():
             changes.enter_context(mock.patch.object(CONSTANTS[name], name, value))
+        changes.enter_context(mock.patch.object(soles, 'LOSS', setup.loss))
         return _walk(setup, policy, seed)
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_pad.contact.resistance import Foot
-from ros_pad.control.footprints import Footprints, FrictionFelt
+from ros_pad.contact.resistance import Foot, expected_friction
+from ros_pad.control.footprints import CERTAIN, Footprints, FrictionFelt
 
 
 @pytest.mark.parametrize(('distance', 'share'), [(0.0, 1.0), (0.5, 0.606531), (2.0, 0.135335)])
@@ -61,6 +61,30 @@ def test_feet_do_not_change_their_mind_between_the_factors():
         for _ in range(100):
             felt.add(True, 0.05, friction)
         assert felt.flat_pays is pays
+
+
+def test_domes_that_do_not_hold_on_wet_ground_are_found():
+    """By hand: on dry ground domes lose 0.80 - 0.41, and on wet ground win their friction less
+    1.1 · 0.12, at first that after landing."""
+    felt = FrictionFelt(FOOT, LOAD)
+    landed = expected_friction(FOOT, LOAD).landed
+    assert felt.break_even == pytest.approx(0.39 / (0.39 + landed - 0.132), abs=0.01)
+    assert 0.6 < felt.break_even < 0.7
+    for _ in range(100):
+        felt.add(False, 0.5, 0.41)  # this may be dry ground
+    assert 0.6 < felt.break_even < 0.7
+    for _ in range(100):
+        felt.add(False, 0.9, 0.166)
+        felt.add(False, 0.1, 0.41)
+        felt.add(True, 0.9, 0.12)
+    # The mean of all domes is between 0.166 and 0.41.
+    assert 0.39 / (0.39 + 0.034) < felt.break_even < 0.63 / (0.63 + 0.034)
+    for _ in range(100):
+        felt.add(False, 0.9, 0.10)
+    assert felt.break_even == CERTAIN
+    for _ in range(100):
+        felt.add(False, 0.9, 0.40)
+    assert felt.break_even < 0.65
 
 
 @pytest.mark.parametrize('friction', [math.nan, math.inf, -0.1])

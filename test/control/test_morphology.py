@@ -67,6 +67,11 @@ def lift_off(**changes):
         ({'morphology': 'dome', 'steps': 63, 'flat_pays': False}, Choice('dome')),
         ({'morphology': 'dome', 'steps': 64, 'flat_pays': False}, Choice('flat', probe=True)),
         ({'morphology': 'dome', 'steps': math.inf, 'flat_pays': False}, Choice('dome')),
+        # If domes hold hardly more on wet ground, only ground that is surely wet makes domes.
+        ({'wet_ahead': 0.89, 'break_even': 0.9}, Choice('flat')),
+        ({'wet_ahead': 0.91, 'break_even': 0.9}, Choice('dome')),
+        ({'morphology': 'dome', 'wet_ahead': 0.89, 'break_even': 0.9}, Choice('flat', probe=True)),
+        ({'morphology': 'dome', 'wet_ahead': 0.91, 'break_even': 0.9}, Choice('dome')),
     ],
 )
 def test_adaptive_step_by_step(step, expected):

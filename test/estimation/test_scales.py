@@ -57,7 +57,9 @@ def test_domes_on_wet_ground_hold_what_the_contact_model_has_after_landing_or_mo
     assert on_wet == pytest.approx(mean, abs=0.02)  # 0.119: mean of -ln over 0.78 to 1
     same = PRIOR._replace(landed=PRIOR.dome)
     *_, on_dry, on_wet = FrictionScales(same).expected(0.0).rows @ np.log(GRID)
-    assert on_wet == pytest.approx(0.95 * on_dry + 0.05 * math.log(math.sqrt(0.12 * 0.41)), abs=1e-4)
+    assert on_wet == pytest.approx(
+        0.95 * on_dry + 0.05 * math.log(math.sqrt(0.12 * 0.41)), abs=1e-4
+    )
 
 
 def test_what_a_foot_said_is_taken_back():
