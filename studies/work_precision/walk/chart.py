@@ -101,7 +101,8 @@ def draw(results: Sequence[WalkResult]) -> Figure:
 def _with_steps(family: str, part: Sequence[WalkResult]) -> str:
     """Return the name of a family with its shortest and longest step, ms."""
     steps = [1e3 * each.step_s for each in part if each.family == family and each.step_s]
-    return f'{family}: {min(steps):g} to {max(steps):g} ms' if steps else family
+    ends = dict.fromkeys(f'{step:g}' for step in (min(steps), max(steps))) if steps else ()
+    return f'{family}: {" to ".join(ends)} ms' if ends else family
 
 
 def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> None:
