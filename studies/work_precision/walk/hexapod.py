@@ -52,7 +52,12 @@ def hexapod_walks() -> list[Walk]:
         _hexapod_walk(name, Scene.load(f'hexapod_{scene}'), shape, seed)
         for name, (scene, shape, seed) in shipped.items()
     ]
-    return [*walks, _hexapod_walk('dry, 9 N in tow, dome', heavy, DOME, 0)]
+    stiff = Scene.load('hexapod_smooth_wet_dome')
+    body: Any = stiff.body
+    servo = replace(body.robot.servo, stiffness=10.0 * body.robot.servo.stiffness)
+    stiff = replace(stiff, body=replace(body, robot=replace(body.robot, servo=servo)))
+    others = {'dry, 9 N in tow, dome': heavy, 'wet, dome, stiff servos': stiff}
+    return walks + [_hexapod_walk(name, scene, DOME, 0) for name, scene in others.items()]
 
 
 def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
