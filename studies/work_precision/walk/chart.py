@@ -14,13 +14,13 @@ from matplotlib.lines import Line2D
 
 from ros_pad.pace import Progress
 from studies import command
-from studies.drawing import BLACK, BLUE, GREEN, PALE, SKY, STYLE, VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, SKY, STYLE, VERMILION
 from studies.work_precision.walk.hexapod import DRAKE, TOP
 from studies.work_precision.walk.results import FAILED, WalkResult
-from studies.work_precision.walk.walkers import HEXAPOD, RAIL, named
+from studies.work_precision.walk.walkers import HEXAPOD, RAIL
 
 # Methods that are shown walk by walk.
-SHOWN = (named('L1', 4e-3), named('L2', 1e-3), named('MuJoCo defaults', 2e-3))
+SHOWN = ('L1, 4 ms', 'L2, 1 ms', 'L2 without landing, 1 ms', 'MuJoCo defaults, 2 ms')
 # Name, unit and scale of each error.
 _UNITS = {
     'distance': ('distance', '%', 1e2),
@@ -57,13 +57,17 @@ def figures(results: Sequence[WalkResult], progress: Progress | None = None) -> 
     return {'walk': draw(results)}
 
 
+_RING: dict[str, Any] = {'marker': 'o', 'mfc': 'none', 'ms': 10.0}
 _LOOKS: dict[str, dict[str, Any]] = {
     'L1': {'color': BLUE, 'marker': 'o'},
     'L1, compiled': {'color': SKY, 'marker': 's'},
+    'L1 without landing': {'color': BLUE, **_RING},
     'L2': {'color': GREEN, 'marker': 'D'},
+    'L2 without landing': {'color': ORANGE, 'marker': 'D', 'mfc': 'none'},
     'MuJoCo defaults': {'color': VERMILION, 'marker': 'X'},
     DRAKE: {'color': BLACK, 'marker': '^'},
     'RailLeg': {'color': GREEN, 'marker': 'o'},
+    'RailLeg without landing': {'color': GREEN, **_RING},
     'solve_ivp, events, 1e-6': {'color': BLUE, 'marker': 'D'},
 }
 
@@ -73,7 +77,7 @@ def draw(results: Sequence[WalkResult]) -> Figure:
     hexapod, rail = (
         [result for result in results if result.robot == robot] for robot in (HEXAPOD, RAIL)
     )
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE | {'lines.markersize': 6.0}):
         figure = Figure(figsize=(11.5, 8.0), layout='constrained')
         panels = figure.subplots(2, 3).ravel()
         for letter, place, name in zip('abce', (0, 1, 2, 4), _UNITS, strict=True):
@@ -82,7 +86,7 @@ def draw(results: Sequence[WalkResult]) -> Figure:
         _errors(panels[5], rail, 'distance', 'f  rail leg: distance')
         families = {result.family for result in results}
         handles = [
-            Line2D([], [], ls='', ms=6, label=_with_steps(family, results), **look)
+            Line2D([], [], ls='', label=_with_steps(family, results), **look)
             for family, look in _LOOKS.items()
             if family in families
         ]
@@ -97,7 +101,8 @@ def draw(results: Sequence[WalkResult]) -> Figure:
 def _with_steps(family: str, part: Sequence[WalkResult]) -> str:
     """Return the name of a family with its shortest and longest step, ms."""
     steps = [1e3 * each.step_s for each in part if each.family == family and each.step_s]
-    return f'{family}: {min(steps):g} to {max(steps):g} ms' if steps else family
+    ends = dict.fromkeys(f'{step:g}' for step in (min(steps), max(steps))) if steps else ()
+    return f'{family}: {" to ".join(ends)} ms' if ends else family
 
 
 def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> None:
@@ -110,7 +115,7 @@ def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> N
         mine.sort(key=lambda result: result.step_s or 0.0)
         x = [result.ms_per_second for result in mine]
         y = [scale * result.errors[name] for result in mine]
-        panel.plot(x, y, ls='-', lw=1.0, ms=6, zorder=3, **look)
+        panel.plot(x, y, ls='-', lw=1.0, zorder=3, **look)
         for result, at, error in zip(mine, x, y, strict=True):
             ends = [error, scale * result.worst[name]]
             panel.plot([at, at], ends, '-_', color=look['color'], lw=1.0, ms=5, alpha=0.5)

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot of L2 in Drake, an engine that shares no code with MuJoCo or with ros_pad's solvers.
 
-Links, masses, servos, gait, floor, films and the law of resistance are the same; rigid-body
-dynamics are Drake's. Drake's own friction is that of a point and has no yaw moment, so feet are
-force elements: the ground is a stiff damped spring; along it a foot shears elastically up to its
-cap, which sliding and turning share, as on L1 and L2.
+Links, masses, servos, gait, floor, films and the laws of spring, damper and resistance of the pads
+are the same; rigid-body dynamics and contact are Drake's, with the stiffness and the dissipation
+(Hunt and Crossley) of the pads. Drake's own friction is that of a point and has no yaw moment, so
+along the ground feet are force elements: a foot shears elastically up to its cap, which sliding
+and turning share, as on L1 and L2.
 """
 
 from __future__ import annotations
 
 import importlib
+import logging
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -19,22 +21,23 @@ import numpy as np
 from ros_pad.contact import laws
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.contact.resistance import DOMED
 from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots.inverse import FeetSolver
 from ros_pad.robots.rotation import Array
 from ros_pad.simulation.full_robot import TIPPED
 from ros_pad.simulation.gait import FootPath
-from ros_pad.simulation.mujoco_model import ROLL_SHARE
+from ros_pad.simulation.mujoco_model import POINT, ROLL_SHARE
 from ros_pad.simulation.robot import FootState, Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.servos import LOST
-from ros_pad.simulation.soles import CLEAR, LIGHT, SLIP_LOAD, SLIP_SPEED
+from ros_pad.simulation.soles import CLEAR, LIGHT, LOSS, SLIP_LOAD, SLIP_SPEED
 from ros_pad.simulation.terrain import Floor
 
 _SHALLOW = 5e-3  # m above the ground: below it the height of the ground under a foot stays
 _THIN = 0.02  # inertia of a rod about its own axis, over that across it, as on L2
 STIFFNESS, DAMPING = 1e5, 200.0
-"""Of the ground, and of feet in shear, N/m and N s/m."""
+"""Of the ground below a towed load, and of feet in shear, N/m and N s/m."""
 
 
 def _drake(module: str) -> Any:
@@ -56,6 +59,8 @@ class DrakeRobot:
         Time between set-points, s.
     step : float
         Step of Drake, s; a period is a whole number of steps.
+    pressure : float
+        Gauge pressure of all pads, Pa.
 
     Raises
     ------
@@ -63,7 +68,9 @@ class DrakeRobot:
         When Drake is missing.
     """
 
-    def __init__(self, scene: Scene, floor: Floor, period: float, step: float) -> None:
+    def __init__(
+        self, scene: Scene, floor: Floor, period: float, step: float, pressure: float
+    ) -> None:
         body: Any = scene.body
         self._body = body
         self.legs, self.period, self.time = scene.legs, period, 0.0
@@ -75,7 +82,10 @@ class DrakeRobot:
         self._dt = period / self._substeps
         self._steps = 0
         self._foot = scene.foot.on_rough(scene.floor.roughness)
-        self._lever = self._foot.turning_radius
+        self._lever, self._pressure = self._foot.turning_radius, pressure
+        place = DOMED * self._foot.ceiling / self._foot.limit_cell
+        inertial = scene.expected_load * GRAVITY
+        self._loss = LOSS * math.sqrt(laws.between(self._foot.stiffnesses, place) / inertial)
         self._films = [Film(self._foot, scene.floor.viscosity) for _ in self.legs]
         self._solver = FeetSolver(body.robot)
         gait: Any = scene.gait
@@ -87,15 +97,18 @@ class DrakeRobot:
     def _tools(self) -> None:
         self._math, self._tree = _drake('math'), _drake('multibody.tree')
         self._plants = _drake('multibody.plant')
-        self._framework = _drake('systems.framework')
+        self._framework, self._geometry = _drake('systems.framework'), _drake('geometry')
+        logging.getLogger('drake').setLevel(logging.ERROR)  # half-spaces do not deform: as wanted
 
     # --- model --------------------------------------------------------------------------------
 
     def _build(self) -> None:
         scene, tree = self._scene, self._tree
         builder = self._framework.DiagramBuilder()
-        self._plant, _ = self._plants.AddMultibodyPlantSceneGraph(builder, self._dt)
+        self._plant, graph = self._plants.AddMultibodyPlantSceneGraph(builder, self._dt)
         plant, slope = self._plant, scene.floor.slope
+        plant.set_contact_model(self._plants.ContactModel.kPoint)
+        plant.set_discrete_contact_approximation(self._plants.DiscreteContactApproximation.kLagged)
         plant.mutable_gravity_field().set_gravity_vector(
             [-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)]
         )
@@ -103,10 +116,19 @@ class DrakeRobot:
             'trunk', tree.SpatialInertia.SolidBoxWithMass(1.0, 0.1, 0.1, 0.1)
         )
         self._joints: list[Any] = []
+        self._blocks: list[Any] = []  # joints on which the ground below a foot moves up and down
+        self._grounds: list[list[Any]] = []  # shapes that may touch each other
+        if self._floor.heights is None:
+            self._add_ground(plant.world_body())
         self._tips = [self._add_leg(leg) for leg in range(len(self.legs))]
         if scene.tow.weight:
             self._add_sled()
         plant.Finalize()
+        rules, some = self._geometry.CollisionFilterDeclaration(), self._geometry.GeometrySet
+        for number, ground in enumerate(self._grounds):
+            for other in self._grounds[:number]:  # a foot touches its own ground only
+                rules.ExcludeBetween(some(ground), some(other))
+        graph.collision_filter_manager().Apply(rules)
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
         self._context = plant.GetMyMutableContextFromRoot(self._root)
@@ -143,7 +165,45 @@ class DrakeRobot:
             motor.set_default_gear_ratio(1.0)
             self._joints.append(added)
             parent = link
+        self._add_point(leg, parent, tip)
         return plant.AddFrame(tree.FixedOffsetFrame(f'foot_{leg}', parent, self._transform(tip)))
+
+    def _add_point(self, leg: int, link: Any, tip: Array) -> None:
+        """Add the point of a foot, and on uneven floors the ground below it.
+
+        The point is rigid: the ground has all of the compliance.
+        """
+        plant, tree, shape = self._plant, self._tree, self._geometry.Sphere(POINT)
+        if self._floor.heights is not None:
+            cube = tree.SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
+            block = plant.AddRigidBody(f'block_{leg}', cube)
+            frames = plant.world_frame(), block.body_frame()
+            joint = tree.PrismaticJoint(f'block_{leg}', *frames, np.eye(3)[2])
+            self._blocks.append(plant.AddJoint(joint))
+            self._add_ground(block)
+        point = plant.RegisterCollisionGeometry(
+            link, self._transform(tip), shape, f'point_{leg}', self._material(1e12)
+        )
+        self._grounds[-1].append(point)
+
+    def _material(self, stiffness: float) -> Any:
+        """Return what Drake's contact has to know of a surface; its own friction is off."""
+        material, none = self._geometry.ProximityProperties(), self._plants.CoulombFriction()
+        self._geometry.AddContactMaterial(material, self._loss, stiffness, none)
+        return material
+
+    def _add_ground(self, body: Any) -> None:
+        """Add the ground: from its surface on as stiff as the pads, deeper down as the sole."""
+        foot, sole, self._grounds = self._foot, self._foot.sole_stiffness, [*self._grounds, []]
+        stiffness = laws.spring(foot, 0.0, self._pressure)[1]
+        layers = [(0.0, stiffness)]
+        if stiffness < sole:
+            down = foot.dome_load(math.inf, self._pressure) / stiffness
+            layers.append((down, sole - stiffness))
+        for depth, more in layers:
+            pose = self._math.RigidTransform([0.0, 0.0, -depth - POINT])
+            given = self._geometry.HalfSpace(), f'{body.name()}, {depth:g} m', self._material(more)
+            self._grounds[-1].append(self._plant.RegisterCollisionGeometry(body, pose, *given))
 
     def _add_sled(self) -> None:
         """Add the towed load: a point that does not turn."""
@@ -188,6 +248,9 @@ class DrakeRobot:
         feet = self._path.feet
         self._targets = np.array(self._solver.angles([(x, y, low) for x, y, _ in feet]))
         self._ground = np.array([self._floor.height(x, y) for x, y, _ in feet])
+        for block, height in zip(self._blocks, self._ground.tolist(), strict=False):
+            block.set_translation(context, height)
+            block.Lock(context)
         plant.SetFreeBodyPose(
             context, self._trunk, self._math.RigidTransform([0.0, 0.0, self._ground.max() - low])
         )
@@ -297,16 +360,17 @@ class DrakeRobot:
         return tow.friction_wet if self._floor.wet(place[0], place[1]) else tow.friction_dry
 
     def _press(self, force: Array) -> None:
-        """Add the forces of the ground: springs that press, and bristles up to the cap."""
+        """Add the forces of bristles up to the cap, and what presses the sled."""
         plant, context, count = self._plant, self._context, len(self._tips)
         frames = [*self._tips, *([self._sled.body_frame()] if len(self._loads) > count else [])]
         jacobians = np.array([self._jacobian(frame)[2:] for frame in frames])  # yaw, x, y, z
         speeds = jacobians @ plant.GetVelocities(context)
         places = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
-        deep = -places[:, 2]
-        deep[:count] += self._ground
-        loads = STIFFNESS * deep - DAMPING * speeds[:, 3]
-        loads = np.where(deep > 0.0, np.maximum(loads, 0.0), 0.0)
+        loads = -STIFFNESS * places[:, 2] - DAMPING * speeds[:, 3]  # of the sled
+        loads = np.where(places[:, 2] < 0.0, np.maximum(loads, 0.0), 0.0)
+        for index, depth in enumerate((self._ground - places[:count, 2]).tolist()):
+            spring, _ = laws.spring(self._foot, max(0.0, depth), self._pressure)
+            loads[index] = spring * max(0.0, 1.0 - self._loss * speeds[index, 3])
         levers = np.full(len(frames), self._lever)
         levers[count:] = 0.0
         slides = np.column_stack([speeds[:, 1:3], levers * speeds[:, 0]])
@@ -324,6 +388,7 @@ class DrakeRobot:
         push[slips] *= (caps[slips] / np.maximum(size[slips], 1e-30))[:, None]
         self._shear[slips] = -push[slips] / STIFFNESS
         wrench = np.column_stack([levers * push[:, 2], push[:, :2], loads])
+        wrench[:count, 3] = 0.0  # Drake's contact presses the feet
         force += np.einsum('ijk,ij->k', jacobians, wrench)
         self._loads = loads
 
@@ -340,6 +405,7 @@ class DrakeRobot:
             if self._loads[index] <= LIGHT:
                 if above > _SHALLOW and self._ground[index] != self._floor.height(x, y):
                     self._ground[index] = self._floor.height(x, y)
+                    self._blocks[index].set_translation(self._context, self._ground[index])
                 if above > CLEAR:
                     self._films[index].touch_down(self._floor.depth(x, y))
             elif self._loads[index] > SLIP_LOAD and moved[index] > SLIP_SPEED * self.period:

@@ -16,6 +16,7 @@ from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Scene
 from studies.work_precision.walk.drake import DrakeRobot
+from studies.work_precision.walk.unlanded import stock, unlanded
 from studies.work_precision.walk.walkers import (
     CYCLES,
     HEXAPOD,
@@ -51,7 +52,12 @@ def hexapod_walks() -> list[Walk]:
         _hexapod_walk(name, Scene.load(f'hexapod_{scene}'), shape, seed)
         for name, (scene, shape, seed) in shipped.items()
     ]
-    return [*walks, _hexapod_walk('dry, 9 N in tow, dome', heavy, DOME, 0)]
+    stiff = Scene.load('hexapod_smooth_wet_dome')
+    body: Any = stiff.body
+    servo = replace(body.robot.servo, stiffness=10.0 * body.robot.servo.stiffness)
+    stiff = replace(stiff, body=replace(body, robot=replace(body.robot, servo=servo)))
+    others = {'dry, 9 N in tow, dome': heavy, 'wet, dome, stiff servos': stiff}
+    return walks + [_hexapod_walk(name, scene, DOME, 0) for name, scene in others.items()]
 
 
 def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
@@ -79,9 +85,12 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     steps = (5e-4, 1e-3, 2e-3, 4e-3)
     walkers += [_full('L2', replace(RECOMMENDED, timestep=step)) for step in steps]
     walkers += [
-        _full('MuJoCo defaults', replace(MUJOCO_DEFAULTS, timestep=step), ours=False)
+        stock(_full('MuJoCo defaults', replace(MUJOCO_DEFAULTS, timestep=step), ours=False))
         for step in (5e-4, 2e-3)
     ]
+    # With MuJoCo's own contact feet creep as little at impratio 100.
+    plain = [_full('L2', SolverSettings(step, impratio=100.0)) for step in (1e-3, 2e-3, 4e-3)]
+    walkers += [unlanded(walker) for walker in (_planar('L1', SAMPLE, False), *plain)]
     baseline = named('L2', RECOMMENDED.timestep)
     if importlib.util.find_spec('pydrake'):
         tops: tuple[Walker, ...] = (_full(TOP, replace(RECOMMENDED, timestep=1e-4)), _drake(1e-4))
@@ -93,7 +102,7 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     return [*walkers, *tops], tuple(top.name for top in tops), baseline
 
 
-TOP, DRAKE = 'L2, top', 'Drake, force elements'
+TOP, DRAKE = 'L2, top', 'Drake'
 
 
 def _planar(family: str, step: float, compiled: bool) -> Walker:
@@ -118,7 +127,8 @@ def _full(family: str, settings: SolverSettings, ours: bool = True) -> Walker:
 
 def _drake(step: float) -> Walker:
     def make(case: Walk) -> DrakeRobot:
-        return DrakeRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, step)
+        floor = case.scene.floor.build(case.seed)
+        return DrakeRobot(case.scene, floor, SAMPLE, step, case.pressure)
 
     return _sampled(DRAKE, step, make, False)
 

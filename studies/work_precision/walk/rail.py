@@ -17,6 +17,7 @@ from ros_pad.contact import laws
 from ros_pad.contact.film import Film, landed
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import RailBody, RailGait, Scene
+from studies.work_precision.walk.unlanded import unlanded
 from studies.work_precision.walk.walkers import CYCLES, RAIL, Walk, Walked, Walker, named, walked
 
 LEG, FILM_STEP = 'RailLeg, 4 ms', 5e-5  # s
@@ -43,7 +44,7 @@ def rail_walks() -> list[Walk]:
 
 def rail_walkers() -> list[Walker]:
     """Return all walkers of the rail leg."""
-    walkers = [_rail(step) for step in (1e-4, 1e-3, 4e-3)]
+    walkers = [*(_rail(step) for step in (1e-4, 1e-3, 4e-3)), unlanded(_rail(4e-3))]
     for family, method, tolerance in (
         (EVENTS, 'DOP853', 1e-11),
         ('solve_ivp, events, 1e-6', 'RK45', 1e-6),

@@ -3,8 +3,9 @@
 
 The hexapod walks open loop, its pads at the pressure that a controller would begin with, on the
 floors of the shipped scenes. Errors are relative to the mean of two engines at 0.1 ms, L2 and
-Drake with force elements for feet; half of their difference is drawn as a band. Drake is needed
-for it (pip install drake, mainly BSD-3-Clause).
+Drake, whose contact has the spring and the damper of the pads; half of their difference is drawn
+as a band. Drake is needed for it (pip install drake, mainly BSD-3-Clause). Levels without landing
+have films of rigid discs and MuJoCo's own contact, which MuJoCo's defaults have as well.
 
 Without Drake, errors are relative to L2 with steps of 0.25 ms; the row with half of this step
 shows the uncertainty of this reference. Without MuJoCo, errors are relative to L1 with steps of
