@@ -259,6 +259,11 @@ class Foot:
         return tuple(found.tolist())
 
     @cached_property
+    def dome_stiffness(self) -> float:
+        """Stiffness of all domes at a typical pressure, N/m."""
+        return laws.between(self.stiffnesses, DOMED * self.ceiling / self.limit_cell)
+
+    @cached_property
     def sole_stiffness(self) -> float:
         """Stiffness of the flat sole, N/m: a layer of silicone, free at its sides."""
         return SILICONE * self.sole_area / self.sole_thickness

@@ -25,7 +25,14 @@ from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots.rotation import Array
 from ros_pad.signals import children_spared
 from ros_pad.simulation.balance import Balance
-from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings, mjcf, tow_step
+from ros_pad.simulation.mujoco_model import (
+    LONGEST,
+    RECOMMENDED,
+    SolverSettings,
+    landing_step,
+    mjcf,
+    tow_step,
+)
 from ros_pad.simulation.robot import (
     FootState,
     Proprioception,
@@ -121,11 +128,13 @@ class FullRobot:
         self.period = period
         self.time = 0.0
         self.verdict: str | None = None
-        longest = min(settings.timestep, tow_step(scene))
-        self._substeps = max(1, math.ceil(period / longest - 1e-9))
-        dt = period / self._substeps
-        text = mjcf(scene, floor.heights is not None, settings, dt)
+        longest = min(settings.timestep or LONGEST, tow_step(scene))
+        text = mjcf(scene, floor.heights is not None, settings)
         self.model: Any = mujoco.MjModel.from_xml_string(text)
+        if settings.timestep is None:
+            longest = min(longest, landing_step(scene, self.model))
+        self._substeps = max(1, math.ceil(period / longest - 1e-9))
+        self.model.opt.timestep = dt = period / self._substeps
         self.data: Any = mujoco.MjData(self.model)
         # Views are kept, because it would take time to make them in every step.
         self._state = self.data.qpos[: 7 + len(self.joint_names)]

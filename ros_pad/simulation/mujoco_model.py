@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from html import escape  # xml.sax would import all of urllib
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,12 @@ ROLL_SHARE = 0.6  # inertia of the trunk about x, or about y, over that about z,
 # Radius of the ball that stands for the sole: too small to roll noticeably as the tibia tilts.
 POINT = 1e-4  # m
 
+LONGEST = 1e-3  # s
+
+RESOLVED = 0.2
+"""Longest step over the time 1/ω in which a foot swings on its domes. On wet ground the film under
+them follows their load; with steps twice as long loads come a third more slowly."""
+
 _SHORTEST = 1e-4  # s: a towed load that needs shorter steps is refused
 
 
@@ -32,9 +39,10 @@ class SolverSettings:
 
     Parameters
     ----------
-    timestep : float
-        Longest step, s, 1e-5 to 0.01. The actual step divides the robot's period, and is short
-        enough for the oscillation of a towed load on its line.
+    timestep : float or None
+        Longest step, s, 1e-5 to 0.01; None for :data:`LONGEST`, or as short as feet that land on
+        wet ground need. The actual step divides the robot's period, and is short enough for the
+        oscillation of a towed load on its line.
     integrator : str
         ``Euler``, ``implicit`` or ``implicitfast``.
     cone : str
@@ -44,7 +52,7 @@ class SolverSettings:
         friction limit creeps at a speed proportional to 1/impratio; shorter steps do not help.
     """
 
-    timestep: float = 1e-3
+    timestep: float | None = None
     integrator: str = 'implicitfast'
     cone: str = 'elliptic'
     impratio: float = 3000.0
@@ -82,7 +90,15 @@ def tow_step(scene: Scene) -> float:
     return longest
 
 
-def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str:
+def landing_step(scene: Scene, model: Any) -> float:
+    """Return the longest step of MuJoCo, s, for landing on wet ground; infinite on dry ground."""
+    if scene.floor.kind == 'dry':
+        return math.inf
+    feet = model.geom_bodyid[[model.geom(f'foot_{leg}').id for leg in scene.legs]]
+    return RESOLVED / math.sqrt(scene.foot.dome_stiffness * model.body_invweight0[feet, 0].max())
+
+
+def mjcf(scene: Scene, uneven: bool, settings: SolverSettings) -> str:
     """Return the robot, its towed load and the ground of each foot in MuJoCo's XML.
 
     Parameters
@@ -93,8 +109,6 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
         Whether the ground below each foot can move up and down.
     settings : SolverSettings
         Settings of MuJoCo, except the step.
-    dt : float
-        Step of MuJoCo, s.
 
     Raises
     ------
@@ -122,7 +136,7 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
     return f"""
 <mujoco>
   <compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
-  <option timestep="{dt!r}" integrator="{settings.integrator}" cone="{settings.cone}"
+  <option integrator="{settings.integrator}" cone="{settings.cone}"
           impratio="{settings.impratio!r}" tolerance="1e-6" jacobian="sparse"
           gravity="{-GRAVITY * math.sin(slope)!r} 0 {-GRAVITY * math.cos(slope)!r}">
     <flag autoreset="disable"/>

@@ -16,7 +16,6 @@ import numpy as np
 from ros_pad.contact import laws
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.resistance import DOMED
 from ros_pad.records import Array
 from ros_pad.simulation.mujoco_model import POINT
 from ros_pad.simulation.robot import FootState, check_pressures
@@ -137,8 +136,7 @@ class Soles:
         give = 1.0 / foot.shear_stiffness
         self._give = np.array((give, give, 0.0))
         carried = scene.expected_load / GRAVITY
-        stiffness = laws.between(foot.stiffnesses, DOMED * foot.ceiling / foot.limit_cell)
-        self._loss = LOSS * math.sqrt(stiffness / carried) / GRAVITY
+        self._loss = LOSS * math.sqrt(foot.dome_stiffness / carried) / GRAVITY
         self.contacts: Array = np.zeros((count, 7))
 
     @property
@@ -195,11 +193,12 @@ class Soles:
         """Set spring and damper of a foot at a depth, m, as an implicit step of them needs.
 
         MuJoCo's contact has the force D(-b v - k r - a) at a penetration r, speed v and
-        acceleration a. A spring K and a damper c in a step h need D = K h² + c h and b = 1/h.
+        acceleration a. A damper c, and a spring K at the middle of the step h, need
+        D = K h²/2 + c h and b = 1/h: this is stable at all steps.
         """
         force, stiffness = laws.spring(self.foot, depth, sole.pressure)
         dt, damper = self._dt, self._loss * force
-        mass = stiffness * dt * dt + damper * dt
+        mass = 0.5 * stiffness * dt * dt + damper * dt
         share = mass * sole.inverse / (1.0 + mass * sole.inverse)
         spring = force / depth if depth > 0.0 else stiffness
         sole.normal[0], sole.normal[1] = -spring / mass * share, -share / dt

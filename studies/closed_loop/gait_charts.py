@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.simulation import Scene
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.mujoco_model import RECOMMENDED
+from ros_pad.simulation.mujoco_model import LONGEST, RECOMMENDED
 from studies import command
 from studies.closed_loop.gaits import PERIOD, robots_of, scene_of, walk
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
@@ -191,7 +191,7 @@ def draw_steps(document: Mapping[str, Any]) -> Figure:
     """Return the picture: time against errors, a line for each step of control."""
     figure = Figure(figsize=(9.0, 6.0), layout='constrained')
     at = {(row['control_ms'], row['physics_ms']): row for row in document['rows']}
-    shipped = at[1e3 * PERIOD, 1e3 * RECOMMENDED.timestep]
+    shipped = at[1e3 * PERIOD, 1e3 * LONGEST]
     panels = zip(figure.subplots(2, 2).ravel(), ERRORS.items(), strict=True)
     for panel, (name, (scale, title)) in panels:
         for control, marker in CONTROLS.items():

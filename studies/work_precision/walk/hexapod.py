@@ -12,7 +12,7 @@ from typing import Any
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME, FLAT, policy_named
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings
+from ros_pad.simulation.mujoco_model import LONGEST, RECOMMENDED, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Scene
 from studies.work_precision.walk.drake import DrakeRobot
@@ -91,7 +91,7 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     # With MuJoCo's own contact feet creep as little at impratio 100.
     plain = [_full('L2', SolverSettings(step, impratio=100.0)) for step in (1e-3, 2e-3, 4e-3)]
     walkers += [unlanded(walker) for walker in (_planar('L1', SAMPLE, False), *plain)]
-    baseline = named('L2', RECOMMENDED.timestep)
+    baseline = named('L2', LONGEST)
     if importlib.util.find_spec('pydrake'):
         tops: tuple[Walker, ...] = (_full(TOP, replace(RECOMMENDED, timestep=1e-4)), _drake(1e-4))
         walkers += [_drake(step) for step in (2e-4, 4e-4)]
