@@ -30,7 +30,7 @@ RESOLVED = 0.2
 """Longest step over the time 1/ω in which a foot swings on its domes. On wet ground the film under
 them follows their load; with steps twice as long loads come a third more slowly."""
 
-_SHORTEST = 1e-4  # s: a towed load that needs shorter steps is refused
+_SHORTEST = 1e-4  # s: loads in tow that need shorter steps are refused
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,11 @@ def tow_step(scene: Scene) -> float:
 
 def landing_step(scene: Scene, model: Any) -> float:
     """Return the longest step of MuJoCo, s, for landing on wet ground; infinite on dry ground."""
-    if scene.floor.kind == 'dry':
-        return math.inf
     feet = model.geom_bodyid[[model.geom(f'foot_{leg}').id for leg in scene.legs]]
-    return RESOLVED / math.sqrt(scene.foot.dome_stiffness * model.body_invweight0[feet, 0].max())
+    square = scene.foot.dome_stiffness * model.body_invweight0[feet, 0].max()
+    if scene.floor.kind == 'dry' or not square:
+        return math.inf
+    return max(RESOLVED / math.sqrt(square), _SHORTEST)
 
 
 def mjcf(scene: Scene, uneven: bool, settings: SolverSettings) -> str:

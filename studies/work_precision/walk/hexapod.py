@@ -122,7 +122,7 @@ def _full(family: str, settings: SolverSettings, ours: bool = True) -> Walker:
     def make(case: Walk) -> FullRobot:
         return FullRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
 
-    return _sampled(family, settings.timestep, make, ours)
+    return _sampled(family, settings.timestep or LONGEST, make, ours)
 
 
 def _drake(step: float) -> Walker:
