@@ -196,4 +196,5 @@ class Film:
         """
         landing = min(LANDING, 0.5 * time)
         self.drain(0.5 * dome_load, 0.5 * sole_load, pressure, landing)
-        return self.drain(dome_load, sole_load, pressure, time - landing)
+        # Under the sole a constant load drains as much as one that grows evenly from a half.
+        return self.drain(dome_load, 0.75 * sole_load, pressure, time - landing)

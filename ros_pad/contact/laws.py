@@ -16,14 +16,18 @@ CELLS = 32  # of the area of a dome's contact
 
 # Entries of the film under a foot. Thicknesses are in m; after the last one, the dry share of each
 # cell of equal area of a dome's contact, from the middle outwards.
-FILM = 5
+FILM = 6
 (
     FRESH,  # thickness at touch-down
     SOLE,  # 1/h² under the flat sole, 1/m²
     AREA,  # contact area of one dome, m²
-    RIM,  # width of the rim that has levelled, m
+    EDGE,  # area within the edge of what landed fast, m²: its film levels
+    RIM,  # width of the rim that has levelled there, m
     CORE,  # thickness where that rim ends
 ) = range(FILM)  # fmt: skip
+
+LONGEST = 2e-3  # s, step of a film under domes; longer ones are divided
+SLOW = 0.05  # A contact grows or shrinks slowly that lays less than this share of the film inside.
 
 # Gauss' points of the rim, and their weights.
 POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
@@ -87,46 +91,68 @@ def drained(
     if on_domes > 0.0:
         area = on_domes / (foot.pads * pressure)
         sphere = between(foot.spheres, pressure / foot.limit_cell)
-        spread(foot, film, area, pressure, sphere, time)
-        if slip > 0.0:
-            drag(foot, film, pressure, sphere, slip, time)
+        before, parts = film[AREA], int(time / LONGEST - 1e-9) + 1
+        for part in range(1, parts + 1):
+            then = before + (area - before) * part / parts
+            spread(foot, film, then, pressure, sphere, time / parts)
+            if slip > 0.0:
+                drag(foot, film, pressure, sphere, slip, time / parts)
         share = dry_share(foot, film, sphere)
     else:
         film[AREA] = 0.0
-    thin = foot.critical_film * (-log(max(share, 1e-300))) ** (1.0 / foot.film_exponent)
-    return min(thin, film[FRESH]) if share < 1.0 else 0.0, film[SOLE] ** -0.5
+    thin = 0.0
+    if share < 1.0:
+        thin = foot.critical_film * (-log(max(share, 1e-300))) ** (1.0 / foot.film_exponent)
+    return min(thin, film[FRESH]), film[SOLE] ** -0.5
 
 
 def spread(foot: Any, film: Any, area: float, pressure: float, sphere: float, time: float) -> None:
-    """Change the contact area of a dome within a time, and let the rim of its film level.
+    """Change the contact area of a dome within a time, and let its film level.
 
-    A rim that advances at a speed V lays a film of 0.3215 R (24 η V/(p R))^⅔, as Bretherton's
+    A contact that grows at a speed V lays a film of 0.3215 R (24 η V/(p R))^⅔, as Bretherton's
     bubbles do; at constant speed of the area that is proportional to the area to the power -⅓.
-    When the rim stands or recedes, suction by its curvature levels the film inwards from there.
+    What landed fast levels from its edge inwards, by suction of the curved rim, when the contact
+    stands or changes slowly.
     """
-    before = film[AREA]
+    before, edge, core = film[AREA], film[EDGE], film[CORE]
     speed = abs(area - before) / (time * 2.0 * sqrt(pi * area)) if time > 0.0 else inf
     laid = 0.3215 * sphere * (24.0 * foot.viscosity * speed / (pressure * sphere)) ** (2.0 / 3.0)
-    if area != before and before > 0.0:
-        keep_rim(foot, film, sphere)
-    film[AREA] = area
     if area > before:
-        cell, at = int(before / foot.cell), before
-        while at < area:
-            end = min(area, (cell + 1) * foot.cell)
-            thickness = laid * (2.0 * area / (at + end)) ** (1.0 / 3.0)
-            mix(foot, film, cell, at, end, min(thickness, film[FRESH]))
-            cell, at = cell + 1, end
-        film[RIM], film[CORE] = 0.0, min(laid, film[FRESH])
-        return
-    if area < before:
-        share = film[FILM + min(int(area / foot.cell), CELLS - 1)]
-        share = min(max(share, 1e-300), 1.0 - 1e-12)
-        core = foot.critical_film * (-log(share)) ** (1.0 / foot.film_exponent)
-        film[RIM], film[CORE] = 0.0, min(core, film[FRESH])
-        if laid > 0.5 * core:
+        fast = before <= 0.0 or laid >= SLOW * core
+        if fast:
+            keep_rim(foot, film, sphere)
+            film[EDGE], film[RIM], film[CORE] = area, 0.0, min(laid, film[FRESH])
+        lay(foot, film, area, laid)
+        if fast:
             return
+    elif area < edge:
+        moved = sqrt(edge / pi) - sqrt(area / pi)
+        if laid < SLOW * core and moved < film[RIM]:
+            film[EDGE], film[RIM] = area, film[RIM] - moved
+        else:
+            keep_rim(foot, film, sphere)
+            share = film[FILM + min(int(area / foot.cell), CELLS - 1)]
+            share = min(max(share, 1e-300), 1.0 - 1e-12)
+            core = foot.critical_film * (-log(share)) ** (1.0 / foot.film_exponent)
+            film[EDGE], film[RIM], film[CORE] = area, 0.0, min(core, film[FRESH])
+            if laid > 0.5 * core:
+                film[AREA] = area
+                return
+    film[AREA] = area
     level(foot, film, pressure, sphere, time)
+
+
+def lay(foot: Any, film: Any, area: float, thickness: float) -> None:
+    """Let the contact grow to an area, m², and lay a film, as thick at its end."""
+    cell, at = int(film[AREA] / foot.cell), film[AREA]
+    while at < area and cell < CELLS:
+        first = cell * foot.cell
+        end = min(area, first + foot.cell)
+        laid = thickness * (2.0 * area / (at + end)) ** (1.0 / 3.0)
+        share, kept = dry(foot, min(laid, film[FRESH])), film[FILM + cell] * (at - first)
+        film[FILM + cell] = (kept + share * (end - at)) / (end - first)
+        cell, at = cell + 1, end
+    film[AREA] = area
 
 
 def drag(foot: Any, film: Any, pressure: float, sphere: float, slip: float, time: float) -> None:
@@ -135,34 +161,28 @@ def drag(foot: Any, film: Any, pressure: float, sphere: float, slip: float, time
     It is 0.643 R/2 (6 η U/T)^⅔ thick, as of a foil over a moving surface: the gap has twice the
     curvature 1/R of the free dome. Slow slip dries a dome.
     """
-    keep_rim(foot, film, sphere)
     tension, radius = 0.5 * pressure * sphere, sqrt(film[AREA] / pi)
     thickness = 0.3215 * sphere * (6.0 * foot.viscosity * slip / tension) ** (2.0 / 3.0)
-    film[RIM], film[CORE] = 0.0, min(thickness, film[FRESH])
-    share, part = dry(foot, film[CORE]), min(1.0, slip * time / (4.0 * radius))
+    thickness, part = min(thickness, film[FRESH]), min(1.0, slip * time / (4.0 * radius))
+    share, film[CORE] = dry(foot, thickness), film[CORE] + part * (thickness - film[CORE])
     for cell in range(min(int(film[AREA] / foot.cell) + 1, CELLS)):
         film[FILM + cell] += part * (share - film[FILM + cell])
 
 
-def mix(foot: Any, film: Any, cell: int, start: float, end: float, thickness: float) -> None:
-    """Give a part of a cell, between two areas, m², a film; what lies before it stays."""
-    if cell < CELLS:
-        first = cell * foot.cell
-        kept = film[FILM + cell] * (start - first)
-        film[FILM + cell] = (kept + dry(foot, thickness) * (end - start)) / (end - first)
-
-
 def keep_rim(foot: Any, film: Any, sphere: float) -> None:
-    """Write the film of the rim into its cells, before the rim moves."""
-    if film[RIM] > 0.0:
-        area = film[AREA]
-        radius = sqrt(area / pi)
+    """Write the film of the rim into its cells, before its edge moves."""
+    if film[RIM] > 0.0 and film[AREA] > 0.0:
+        area, edge = film[AREA], film[EDGE]
+        radius = sqrt(edge / pi)
         at = pi * (radius - film[RIM]) * (radius - film[RIM])
         cell = int(at / foot.cell)
-        while at < area:
-            end = min(area, (cell + 1) * foot.cell)
+        while at < edge and cell < CELLS:
+            first = cell * foot.cell
+            end = min(edge, first + foot.cell)
             inwards = radius - sqrt(0.5 * (at + end) / pi)
-            mix(foot, film, cell, at, end, rim_film(film, sphere, inwards))
+            share = dry(foot, rim_film(film, sphere, inwards))
+            part = (end - at) / (min(area, first + foot.cell) - first)
+            film[FILM + cell] += part * (share - film[FILM + cell])
             cell, at = cell + 1, end
 
 
@@ -177,7 +197,7 @@ def level(foot: Any, film: Any, pressure: float, sphere: float, time: float) -> 
 
     The pressure of the air drives the liquid through the thinnest place of the wedge.
     """
-    core, rim, radius = film[CORE], film[RIM], sqrt(film[AREA] / pi)
+    core, rim, radius = film[CORE], film[RIM], sqrt(film[EDGE] / pi)
     if core <= 0.0:
         return
     tension = 0.5 * pressure * sphere
@@ -196,22 +216,30 @@ def level(foot: Any, film: Any, pressure: float, sphere: float, time: float) -> 
 
 def dry_share(foot: Any, film: Any, sphere: float) -> float:
     """Return the share of dry contact under a dome."""
-    area = film[AREA]
-    radius, rim = sqrt(area / pi), film[RIM]
-    inside = area if rim <= 0.0 else pi * (radius - rim) * (radius - rim)
-    whole = min(int(inside / foot.cell), CELLS)
-    total = 0.0
-    for cell in range(whole):
-        total += film[FILM + cell]
-    total *= foot.cell
-    if whole < CELLS:
-        total += film[FILM + whole] * (inside - whole * foot.cell)
-    if rim > 0.0:
-        for index in range(len(POINTS)):
-            inwards, weight = POINTS[index] * rim, WEIGHTS[index]
-            share = dry(foot, rim_film(film, sphere, inwards))
-            total += weight * rim * share * 2.0 * pi * (radius - inwards)
+    area, rim = film[AREA], film[RIM]
+    if rim <= 0.0:
+        return between_areas(foot, film, 0.0, area) / area
+    radius = sqrt(film[EDGE] / pi)
+    total = between_areas(foot, film, 0.0, pi * (radius - rim) * (radius - rim))
+    total += between_areas(foot, film, film[EDGE], area)
+    for index in range(len(POINTS)):
+        inwards, weight = POINTS[index] * rim, WEIGHTS[index]
+        share = dry(foot, rim_film(film, sphere, inwards))
+        total += weight * rim * share * 2.0 * pi * (radius - inwards)
     return total / area
+
+
+def between_areas(foot: Any, film: Any, start: float, end: float) -> float:
+    """Return the dry area of cells between two areas, m²."""
+    size = foot.cell
+    first, last = int(start / size), min(int(end / size), CELLS)
+    if first >= last:
+        return film[FILM + first] * (end - start) if first < CELLS else 0.0
+    whole = 0.0
+    for cell in range(FILM + first + 1, FILM + last):
+        whole += film[cell]
+    whole = whole * size + film[FILM + first] * ((first + 1) * size - start)
+    return whole + film[FILM + last] * (end - last * size) if last < CELLS else whole
 
 
 def dry(foot: Any, thickness: float) -> float:

@@ -125,13 +125,13 @@ class Foot:
         Volume of air in the foot without the domes, m³.
     ceiling : float
         Highest gauge pressure that may be commanded, Pa.
-    sole_thickness : float
-        Thickness of the silicone of the sole, which gives under load, m.
     limit : str
         Criterion of the force limit, see :mod:`ros_pad.contact.limits`.
     capillary_force : float
         Tangential force that the liquid around one dome adds on wet ground, F_cap of Eq. 3.65, N:
         from ``pad wet``, or measured. 0 for none.
+    sole_thickness : float
+        Thickness of the silicone of the sole, which gives under load, m.
 
     Raises
     ------
@@ -160,9 +160,9 @@ class Foot:
     shear_stiffness: float
     chamber_volume: float
     ceiling: float
-    sole_thickness: float = 7e-3
     limit: str = DEFAULT_CRITERION
     capillary_force: float = 0.0
+    sole_thickness: float = 7e-3
 
     def __post_init__(self) -> None:
         for each in FOOT_SETTINGS[1:]:
@@ -252,10 +252,10 @@ class Foot:
         pressures = self.limit_cell * np.arange(len(self.limits))
         forces = np.array(self.limits) / (2.0 * self.pads)
         found = np.zeros(len(pressures))
-        able = forces > 0.0
-        free = inflate(self.pad, pressures[able]).height
-        gaps = press(self.pad, pressures[able], forces[able]).gap
-        found[able] = self.pads * forces[able] / (free - gaps)
+        if (able := forces > 0.0).any():
+            free = inflate(self.pad, pressures[able]).height
+            gaps = press(self.pad, pressures[able], forces[able]).gap
+            found[able] = self.pads * forces[able] / (free - gaps)
         return tuple(found.tolist())
 
     @cached_property
@@ -481,8 +481,8 @@ class ExpectedFriction(NamedTuple):
     flat_dry, flat_wet, dome : float
         Flat on dry and on wet ground, and as a dome on dry ground.
     landed : float
-        As a dome on wet ground, just after half of the load has landed: from there friction grows,
-        at most to that on dry ground.
+        As a dome on wet ground with the film that half of the load has left just after landing:
+        from there friction grows, at most to that on dry ground.
     """
 
     flat_dry: float
@@ -497,10 +497,12 @@ def expected_friction(foot: Foot, load: float) -> ExpectedFriction:
     Wet ground has water, too thick to drain under a flat sole.
     """
     film, pressure = Film(foot), DOMED * foot.ceiling
+    on_domes = foot.dome_load(load, pressure)
     film.touch_down(THICK_FILM)
+    films = film.drain(0.5 * on_domes, 0.5 * (load - on_domes), pressure, LANDING)
     return ExpectedFriction(
         foot.grip(load, 0.0) / load,
         laws.resistance(foot, 0.0, load, 0.0, 0.0, THICK_FILM) / load,
         foot.grip(load, pressure) / load,
-        foot.grip(0.5 * load, pressure, film, LANDING) / (0.5 * load),
+        laws.resistance(foot, on_domes, load - on_domes, pressure, *films) / load,
     )

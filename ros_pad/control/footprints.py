@@ -95,6 +95,7 @@ class FrictionFelt:
 
     def __init__(self, foot: Foot, load: float) -> None:
         self._flat_dry, self._flat_wet, self._dome, self._wet_dome = expected_friction(foot, load)
+        self._dry_dome = self._dome
         self.flat_pays = self._flat_dry >= PAYS * self._dome
 
     def add(self, flat: bool, wet_probability: float, friction: float) -> None:
@@ -105,6 +106,8 @@ class FrictionFelt:
             self._dome += NEW_SHARE * (friction - self._dome)
             if wet_probability > WET:
                 self._wet_dome += NEW_SHARE * (friction - self._wet_dome)
+            else:
+                self._dry_dome += NEW_SHARE * (friction - self._dry_dome)
         elif wet_probability < DRY:
             self._flat_dry += NEW_SHARE * (friction - self._flat_dry)
         elif wet_probability > WET:
@@ -117,6 +120,6 @@ class FrictionFelt:
 
         From 0 to :data:`CERTAIN`; on wet ground domes must hold more by :data:`CHANCE`.
         """
-        lost = max(self._flat_dry - self._dome, 0.0)
+        lost = max(self._flat_dry - self._dry_dome, 0.0)
         won = max(self._wet_dome - CHANCE * self._flat_wet, 1e-9)
         return min(lost / (lost + won), CERTAIN)

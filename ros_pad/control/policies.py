@@ -77,7 +77,8 @@ IsWet = Callable[[float, float], bool]
 
 SETTINGS = (
     Setting('policy.wet_above', 0.65,
-            'Adaptive policy: probability of wet ground ahead above which a foot becomes a dome.',
+            'Adaptive policy: probability of wet ground ahead above which a foot becomes a dome, if'
+            ' domes are expected to hold more there.',
             '', 0.0, 1.0),
     Setting('policy.dry_below', 0.35,
             'Adaptive policy: probability of wet ground ahead below which a foot becomes flat; at'
@@ -147,8 +148,8 @@ def adaptive(
     Parameters
     ----------
     wet_above, dry_below : float
-        Probabilities of wet ground ahead, 0 to 1, above which a foot becomes a dome and below
-        which it becomes flat again.
+        Probabilities of wet ground ahead, 0 to 1, above which a foot becomes a dome, if that is
+        above break-even, too, and below which it becomes flat again.
     probe_below : float
         Probability of wet ground ahead, 0 to 1, below which a domed foot probes.
     dwell : int

@@ -51,8 +51,8 @@ possible, and wet or dry never become certain."""
 
 UNDRAINED = 0.05
 """Probability that the film under a dome has not drained as the contact model has it, for example
-in a fast slip. Its friction is then anywhere between that of a flat sole and that of a dome; else
-over that on dry ground it is any factor from that just after landing to one."""
+in a fast slip. Its friction is then anywhere between that of a flat sole and that of a dome.
+Otherwise it is the dry friction times any factor between the one just after landing and one."""
 
 BEYOND = 0.1
 """Distance of ln(expected friction) from the grid from which on it is moved to the grid's end:

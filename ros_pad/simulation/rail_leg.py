@@ -128,8 +128,8 @@ class RailLeg:
             state.wet = self._floor.wet(self._x + offset, 0.0)
             on_domes, films = foot.dome_load(load, pressure), (0.0, 0.0)
             if state.wet:
-                since = (self.time - self._scene.settle) % gait.cycle
-                share = landed(since, 0.5 * gait.stance)
+                since = max(0.0, self.time - self._scene.settle) % gait.cycle
+                share = landed(max(since, dt), 0.5 * gait.stance)
                 films = self.film.drain(
                     share * on_domes, share * (load - on_domes), pressure, dt, state.slip_speed
                 )

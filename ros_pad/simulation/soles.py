@@ -23,8 +23,8 @@ from ros_pad.simulation.scene import Scene, Tow
 from ros_pad.simulation.terrain import Floor
 
 LOSS = 0.15
-"""Loss factor of a foot under its expected load, in the motion of that mass; it grows with the
-force. As of casting silicones, assumed.
+"""Loss factor of domes that swing under the mass that a foot carries, under its weight; the damper
+grows with the force. As of casting silicones, assumed.
 """
 
 LIGHT = 0.05
@@ -136,7 +136,9 @@ class Soles:
         give = 1.0 / foot.shear_stiffness
         self._give = np.array((give, give, 0.0))
         carried = scene.expected_load / GRAVITY
-        self._loss = LOSS * math.sqrt(foot.dome_stiffness / carried) / GRAVITY
+        self._loss = (
+            LOSS * math.sqrt((foot.dome_stiffness or foot.sole_stiffness) / carried) / GRAVITY
+        )
         self.contacts: Array = np.zeros((count, 7))
 
     @property

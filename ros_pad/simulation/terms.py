@@ -81,7 +81,7 @@ def terms(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> li
     if level == 'L1':
         found.append(_joints(scene, policy))
     if level != 'L0':
-        found.append(_sole(scene))
+        found.append(_sole(scene, policy))
     found.append(replace(_soft_pads(scene), taken=level == 'L1'))
     if policy != 'flat':
         found.append(_air(scene))
@@ -196,9 +196,10 @@ def _pull(scene: Scene, policy: str) -> Term:
     it pulls at a line of contact, at most with its tension all round.
     """
     foot = scene.foot
-    domed = policy == 'dome' and Stand(scene, True).on_sole == 0.0
-    count, radius = (foot.pads, foot.pad.radius) if domed else (1, foot.sole_radius)
-    pull = count * 2.0 * math.pi * radius * WATER.surface_tension
+    lines = [0.0 if policy == 'flat' else foot.pads * foot.pad.radius]
+    if policy != 'dome' or Stand(scene, True).on_sole > 0.0:
+        lines.append(foot.sole_radius)
+    pull = 2.0 * math.pi * max(lines) * WATER.surface_tension
     return Term(
         'pull of the liquid to the floor',
         pull / scene.expected_load,
@@ -221,12 +222,14 @@ def _suction(scene: Scene, policy: str) -> Term:
         force = ATMOSPHERE * count * math.pi * radius**2
         viscous = 12.0 * math.pi * scene.floor.viscosity * count * radius**4
         most, until = max((most, until), (force, (viscous / (rise**2 * force)) ** 0.2))
-    return Term(
+    term = Term(
         'suction of the film at lift-off',
         1.25 * most * until / (scene.expected_load * gait.stance),
         f'of the impulse of a load of {_brief(scene.expected_load)} N in its stance: at most'
-        f' {_brief(most)} N, the atmosphere on the contact, for {_brief(1e3 * until)} ms',
+        f' {_brief(most)} N, the atmosphere on the contact, for {_brief(1e3 * until)} ms; it loads'
+        ' the feet that stand',
     )
+    return replace(term, effect=_of_one(term, 1.0, scene, policy))
 
 
 def _air(scene: Scene) -> Term:
@@ -252,33 +255,62 @@ def _joints(scene: Scene, policy: str) -> Term:
     return Term(name, known, reason, kind='promise', effect=known)
 
 
-def _sole(scene: Scene) -> Term:
+def _of_one(term: Term, share: float, scene: Scene, policy: str) -> float | None:
+    """Return the effect of a share of a term that changes the load of one of the standing feet.
+
+    On a rail, loads are given.
+    """
+    if not share or not isinstance(scene.gait, WalkingGait):
+        return 0.0
+    feet = int(len(scene.legs) * scene.gait.duty + 1e-9)
+    assert term.bound is not None
+    return _by_friction(replace(term, bound=share * term.bound / feet), scene, policy)
+
+
+def _sole(scene: Scene, policy: str) -> Term:
     """Return what a foot that is a point, on an ankle that tilts freely, leaves out.
 
     The centre of pressure of a sole moves by a radius R at most. On three feet moments balance
     about the line through two of them: the load of the third, at a height h, moves by W R/h; that
     of two feet at a distance d by W R/d.
     """
-    (body, gait), found = scene.legged, 0.0
+    (body, gait), found, longest = scene.legged, 0.0, 0.0
     for middle in set(gait.middles):
         feet = [home for home, own in zip(body.homes, gait.middles, strict=True) if own == middle]
-        if len(feet) == 2:
-            found = max(found, 2.0 * scene.foot.sole_radius / math.dist(*feet))
-            continue
-        if len(feet) != 3:
+        if len(feet) not in (2, 3):
             return Term(
                 'size of the sole', None, 'loads of feet are not those of a tripod or trot'
             )
         longest = max(math.dist(a, b) for a, b in itertools.combinations(feet, 2))
-        (x0, y0), (x1, y1), (x2, y2) = feet
-        area = abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
-        found = max(found, 3.0 * scene.foot.sole_radius * longest / area)
-    return Term(
+        height = longest
+        if len(feet) == 3:
+            (x0, y0), (x1, y1), (x2, y2) = feet
+            height = abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)) / longest
+        found = max(found, len(feet) * scene.foot.sole_radius / height)
+    term = Term(
         'size of the sole',
         found,
         'of the load of a foot: centres of pressure move by a radius of the sole; what'
         ' one foot loses others gain',
     )
+    share = _differ(scene, policy, longest)
+    return replace(term, effect=_of_one(term, share, scene, policy))
+
+
+def _differ(scene: Scene, policy: str, distance: float) -> float:
+    """Return by what share friction differs between feet at a distance, m, mean over a walk."""
+    grips = [
+        mid_stance_grip(scene, policy == 'dome' or (wet and policy != 'flat'), wet)
+        for wet in grounds(scene)
+    ]
+    low, high = min(grips), max(grips)
+    if low == high:
+        return 0.0
+    floor, between = scene.floor, 1.0
+    if floor.kind == 'patches':  # the probability that one foot is on wet ground, the other on dry
+        wet, dry = floor.wet_fraction, 1.0 - floor.wet_fraction
+        between = 2.0 * wet * dry * -math.expm1(-distance / (floor.patch_length * dry))
+    return between * 2.0 * (high - low) / (high + low)
 
 
 def _soft_pads(scene: Scene) -> Term:

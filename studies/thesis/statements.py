@@ -171,7 +171,7 @@ def _walks() -> tuple[Claim, ...]:
         film, shares = Film(own), []
         for pressure in WALKED:
             film.touch_down(FILM)
-            under, _ = film.drain(LOAD, 0.0, pressure, 0.5)
+            under, _ = film.stand(LOAD, 0.0, pressure, 0.5)
             shares.append(math.exp(-((under / own.critical_film) ** own.film_exponent)))
         dry[name] = np.array(shares)
     radius, water = foot.pad.radius, WATER.surface_tension
