@@ -146,8 +146,7 @@ def lay(foot: Any, film: Any, area: float, thickness: float) -> None:
     """Let the contact grow to an area, m², and lay a film, as thick at its end."""
     cell, at = int(film[AREA] / foot.cell), film[AREA]
     while at < area and cell < CELLS:
-        first = cell * foot.cell
-        end = min(area, first + foot.cell)
+        first, end = cell * foot.cell, min(area, (cell + 1) * foot.cell)
         laid = thickness * (2.0 * area / (at + end)) ** (1.0 / 3.0)
         share, kept = dry(foot, min(laid, film[FRESH])), film[FILM + cell] * (at - first)
         film[FILM + cell] = (kept + share * (end - at)) / (end - first)
@@ -177,11 +176,11 @@ def keep_rim(foot: Any, film: Any, sphere: float) -> None:
         at = pi * (radius - film[RIM]) * (radius - film[RIM])
         cell = int(at / foot.cell)
         while at < edge and cell < CELLS:
-            first = cell * foot.cell
-            end = min(edge, first + foot.cell)
+            first, full = cell * foot.cell, (cell + 1) * foot.cell
+            end = min(edge, full)
             inwards = radius - sqrt(0.5 * (at + end) / pi)
             share = dry(foot, rim_film(film, sphere, inwards))
-            part = (end - at) / (min(area, first + foot.cell) - first)
+            part = (end - at) / (min(area, full) - first)
             film[FILM + cell] += part * (share - film[FILM + cell])
             cell, at = cell + 1, end
 

@@ -77,8 +77,8 @@ IsWet = Callable[[float, float], bool]
 
 SETTINGS = (
     Setting('policy.wet_above', 0.65,
-            'Adaptive policy: probability of wet ground ahead above which a foot becomes a dome, if'
-            ' domes are expected to hold more there.',
+            'Adaptive policy: probability of wet ground ahead above which a foot becomes a dome,'
+            ' if domes are expected to hold more there.',
             '', 0.0, 1.0),
     Setting('policy.dry_below', 0.35,
             'Adaptive policy: probability of wet ground ahead below which a foot becomes flat; at'

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
 import math
 
 import pytest
@@ -68,6 +69,8 @@ def test_domes_that_do_not_hold_on_wet_ground_are_found():
     1.1 · 0.12, at first that after landing."""
     felt = FrictionFelt(FOOT, LOAD)
     landed = expected_friction(FOOT, LOAD).landed
+    pinned = expected_friction(dataclasses.replace(FOOT, capillary_force=0.05), LOAD)
+    assert pinned.landed == pytest.approx(landed + 37 * 0.05 / LOAD)  # at the whole load
     assert felt.break_even == pytest.approx(0.39 / (0.39 + landed - 0.132), abs=0.01)
     assert 0.6 < felt.break_even < 0.7
     for _ in range(100):

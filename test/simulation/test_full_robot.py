@@ -422,6 +422,16 @@ def test_landings_do_not_hang_on_the_step(name, cycles, step, off):
     assert 2e-3 < np.median(fine) < 10e-3
 
 
+def test_feet_whose_domes_carry_nothing_stand_on_their_soles():
+    """By the measured line a dome of 45 kPa carries nothing; a sole of 17 mm has 38.9 kN/m."""
+    foot = dataclasses.replace(SHIPPED.foot, ceiling=45e3)
+    robot = FullRobot(scene_of(foot=foot), WET, 0.004)
+    advance(robot, 0.49, pressures=[45e3] * 6)
+    tips = [robot.model.geom(f'foot_{leg}').id for leg in range(1, 7)]
+    depths = POINT - robot.data.geom_xpos[tips, 2]
+    assert depths * 38.9e3 == pytest.approx(robot.contacts[:, 2], rel=5e-3)
+
+
 def test_a_foot_is_the_spring_of_its_domes():
     """Standing on domes of 75 kPa it sinks by its load over 7.29 kN/m."""
     robot = FullRobot(scene_of(), DRY, 0.004)

@@ -160,6 +160,19 @@ def on_slope(scene, slope):
     return dataclasses.replace(scene, floor=dataclasses.replace(scene.floor, slope=slope))
 
 
+def test_a_foot_that_lands_on_wet_ground_does_not_grip_as_on_dry_ground():
+    """Friction grows over a stance; at touch-down it is less than when half of the load is on."""
+    scene = dataclasses.replace(Scene.load('leg_wet_dome_75'), cycles=3)
+    leg, grips = leg_of(scene, 0.004), []
+    while leg.time < scene.settle + 2.5 * scene.gait.cycle:
+        leg.step([75e3])
+        grips.append((leg.time, leg.feet[0].grip))
+    time, grip = np.array(grips).T
+    lands = scene.settle + scene.gait.cycle
+    stance = grip[(time >= lands - 1e-6) & (time < lands + 0.5 * scene.gait.stance)]
+    assert stance[0] < stance[2] < stance[-1]
+
+
 def test_wheels_hold_up_to_their_drag_and_roll_above():
     """Without grip the body rests while M g sin(slope) < F, else a = g sin(slope) - F/M."""
     limit = math.asin(DRAG / (MASS * 9.81))
