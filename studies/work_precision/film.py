@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Soft squeeze films beside Stefan's and Reynolds': time against error, shapes, and a rule.
+"""Soft squeeze films beside Stefan's and Reynolds': time against error, and shapes.
 
 Writes film.png and .json, and prints tables, the last of how fast simulated walks load their feet
 (L2, needs mujoco). The pad is the thesis' (1.5 mm), in water 0.3 mm
