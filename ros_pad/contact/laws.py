@@ -26,6 +26,7 @@ FILM = 6
     CORE,  # thickness where that rim ends
 ) = range(FILM)  # fmt: skip
 
+LEAST = 1e-9  # N; below it a dome has no contact
 LONGEST = 2e-3  # s, step of a film under domes; longer ones are divided
 SLOW = 0.05  # A contact grows or shrinks slowly that lays less than this share of the film inside.
 
@@ -88,7 +89,7 @@ def drained(
     if on_sole > 0.0:
         film[SOLE] += foot.sole_drain * on_sole / foot.sole_area * time
     share = 1.0
-    if on_domes > 0.0:
+    if on_domes > LEAST:
         area = on_domes / (foot.pads * pressure)
         sphere = between(foot.spheres, pressure / foot.limit_cell)
         before, parts = film[AREA], int(time / LONGEST - 1e-9) + 1

@@ -44,6 +44,9 @@ FIRST_WAIT, LONGEST_WAIT = 5, 40
 """Flat steps after a fault of the air before a dome is tried again; the number doubles with each
 failed try, up to the second one."""
 
+LASTING = 3
+"""Decisions, of 20 ms, for which a load lasts that a dome is to carry. The impact of landing, of
+one foot or another, ends before: it presses domes flat, and they are up again."""
 
 TOUCH_DOWN = 0.3
 """Additional share of the expected load from which on a foot stands again for the controller. So
@@ -92,9 +95,10 @@ class _Ground:
 
     lift_off: float  # load below which a standing foot has lifted off, N
     touch_down: float  # load from which on it stands again, N
-    peak: float  # largest recent load, N, for which the pressure of domes is chosen
+    peak: float  # largest recent load that lasted, N, for which the pressure of domes is chosen
     stands: bool = False
-    largest: float = 0.0  # largest load of this stance, N
+    loads: Times = field(default_factory=lambda: Times(maxlen=LASTING))  # last ones, N
+    largest: float = 0.0  # largest load of this stance that lasted, N
     stood: tuple[float, float] = (0.0, 0.0)  # last position in stance, m
     lifted: tuple[float, float] | None = None  # position at the last lift-off, m
     lifted_at: float = math.nan  # time of that, s
@@ -480,12 +484,13 @@ class MorphologyController:
         number(f'leg {leg}: wet_probability', wet_probability, '', high=1.0)
         state.updated = state.now
         ground = state.ground
+        ground.loads.append(load)
         stood = ground.stands
         ground.stands = load >= (ground.lift_off if stood else ground.touch_down)
         if ground.stands and not stood:
             self._touch_down(state)
         if load >= ground.lift_off:
-            ground.largest = max(ground.largest, load)
+            ground.largest = max(ground.largest, min(ground.loads))
             ground.stood = (position[0], position[1])
         elif stood:
             self._lift_off(state, wet_probability, position, friction)

