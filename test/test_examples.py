@@ -135,26 +135,22 @@ def test_slip_from_csv(run):
     data = np.genfromtxt(ROOT / 'examples' / 'slip.csv', delimiter=',', names=True)
     stiffness = Foot.load('large37').shear_stiffness
     contact = np.stack([data['x'] + data['fx'] / stiffness, data['y'] + data['fy'] / stiffness])
-    loaded = data['fz'] > 0.5
-    landings = np.flatnonzero(np.diff(loaded.astype(int), prepend=0) > 0)
-    slips = 0
+    cycle = np.floor(data['t'] + 0.6)  # The foot lands at 0.4 s of each, and may bounce.
+    slips = np.zeros(7)
     lines = run('slip_from_csv').splitlines()
     assert '\n'.join(lines) in PAGE.read_text(encoding='utf-8')
     for line in lines:
         begin, slip, wet = numbers(line)[:3]
-        start = landings[np.argmin(abs(data['t'][landings] - begin))]
-        end = start + (int(np.argmin(loaded[start:])) or len(data) - start)
-        # Net motion of the contact, from five readings at either end of the stance.
-        first, last = contact[:, start : start + 5], contact[:, end - 5 : end]
-        net = 1e3 * np.hypot(*(last.mean(axis=1) - first.mean(axis=1)))
-        if net > 5.0:
-            assert slip == pytest.approx(net, rel=0.1)
-            slips += 1
-        else:
-            assert slip < 5.0
-        # The floor of this leg is wet, see docs/tutorials/replay.md; the first stance has no pull.
-        assert wet > 0.5 or (begin < 0.1 and 'not pulled' in line)
-    assert slips == 3
+        slips[int(begin + 0.6)] = max(slips[int(begin + 0.6)], slip)
+        # The floor of this leg is wet, see docs/tutorials/replay.md; the first stances have no pull.
+        assert wet > 0.5 or (begin < 1.44 and 'not pulled' in line)
+    for number, slip in enumerate(slips):
+        # Net motion of the contact, from five readings at either end of the stance. The alarm comes
+        # after some ms, in which the foot slips by a millimetre.
+        stands = contact[:, (cycle == number) & (data['fz'] > 0.5)]
+        net = 1e3 * np.hypot(*(stands[:, -5:].mean(axis=1) - stands[:, :5].mean(axis=1)))
+        assert slip == pytest.approx(net, rel=0.05, abs=1.0) if net > 5.0 else slip < 5.0
+    assert np.count_nonzero(slips > 5.0) == 3
 
 
 def test_the_csv_is_from_the_bag(monkeypatch, tmp_path):
