@@ -142,11 +142,11 @@ def test_slip_from_csv(run):
     for line in lines:
         begin, slip, wet = numbers(line)[:3]
         slips[int(begin + 0.6)] = max(slips[int(begin + 0.6)], slip)
-        # The floor of this leg is wet, see docs/tutorials/replay.md; the first stances have no pull.
+        # The floor of this leg is wet, and the first stances have no pull.
         assert wet > 0.5 or (begin < 1.44 and 'not pulled' in line)
     for number, slip in enumerate(slips):
-        # Net motion of the contact, from five readings at either end of the stance. The alarm comes
-        # after some ms, in which the foot slips by a millimetre.
+        # Net motion of the contact, from five readings at either end of the stance. The alarm
+        # comes after some ms, in which the foot slips by a millimetre.
         stands = contact[:, (cycle == number) & (data['fz'] > 0.5)]
         net = 1e3 * np.hypot(*(stands[:, -5:].mean(axis=1) - stands[:, :5].mean(axis=1)))
         assert slip == pytest.approx(net, rel=0.05, abs=1.0) if net > 5.0 else slip < 5.0

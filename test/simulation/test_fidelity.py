@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from ros_pad import configuration
 from ros_pad.contact import Film, MeasuredLimit
 from ros_pad.control.morphology import MARGIN
 from ros_pad.errors import InvalidInput
@@ -213,6 +214,13 @@ def test_reserve_on_a_film_in_mid_stance():
 
 def bound(scene, word):
     return next((t.bound for t in terms.terms(scene) if word in t.term), None)
+
+
+@pytest.mark.parametrize(
+    'name', [name for name in configuration.names('scenes') if not name.startswith('bench_')]
+)
+def test_nothing_left_out_of_a_shipped_scene_exceeds_its_accuracy(name):
+    assert not [each.term for each in terms.terms(Scene.load(name)) if each.exceeds]
 
 
 def test_bound_of_the_pull_of_liquid():
