@@ -91,12 +91,16 @@ def tow_step(scene: Scene) -> float:
 
 
 def landing_step(scene: Scene, model: Any) -> float:
-    """Return the longest step of MuJoCo, s, for landing on wet ground; infinite on dry ground."""
+    """Return the longest step of MuJoCo, s, for feet that land.
+
+    A flat foot must not bounce higher than it fell: it sinks for a step before it is pushed back.
+    """
     feet = model.geom_bodyid[[model.geom(f'foot_{leg}').id for leg in scene.legs]]
-    square = scene.foot.dome_stiffness * model.body_invweight0[feet, 0].max()
-    if scene.floor.kind == 'dry' or not square:
-        return math.inf
-    return max(RESOLVED / math.sqrt(square), _SHORTEST)
+    inverse, foot = model.body_invweight0[feet, 0].max(), scene.foot
+    square = foot.sole_stiffness * inverse
+    if scene.floor.kind != 'dry':
+        square = max(square, foot.dome_stiffness * inverse / RESOLVED**2)
+    return max(1.0 / math.sqrt(square), _SHORTEST)
 
 
 def mjcf(scene: Scene, uneven: bool, settings: SolverSettings) -> str:

@@ -196,7 +196,7 @@ class Soles:
 
         MuJoCo's contact has the force D(-b v - k r - a) at a penetration r, speed v and
         acceleration a. A damper c, and a spring K at the middle of the step h, need
-        D = K h²/2 + c h and b = 1/h: this is stable at all steps.
+        D = K h²/2 + c h and b = 1/h: stable at all steps, once the foot has touched.
         """
         force, stiffness = laws.spring(self.foot, depth, sole.pressure)
         dt, damper = self._dt, self._loss * force

@@ -13,17 +13,21 @@ import pathlib
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import yaml
 
+from ros_pad.contact import Foot
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.simulation import Scene
 from ros_pad.simulation.full_robot import FullRobot
 from studies import command
 
 PERIOD = 4e-3  # s
+FOOT, LIGHT_FOOT = 'large331', 'large37'  # feet for 15 kg and for 2 kg
+LIGHT = 5.0  # kg, mass of a robot up to which it has the second one
 PATCHES = {'kind': 'patches', 'wet_fraction': 0.4, 'patch_length': 1.0}
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any], float]] = {
     'dry': ({}, {}, 0.0),
@@ -43,7 +47,7 @@ def scene_of(urdf: str, feet: Sequence[str], case: str, cycles: int) -> Scene:
     floor, gait, _ = CASES[case]
     table: dict[str, Any] = {
         'robot': urdf,
-        'foot': 'large331',
+        'foot': FOOT,
         'policy': 'flat',
         'cycles': cycles,
         'accuracy': 0.2,
@@ -58,7 +62,8 @@ def scene_of(urdf: str, feet: Sequence[str], case: str, cycles: int) -> Scene:
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / 'scene.yaml'
         file.write_text(yaml.safe_dump(table))
-        return Scene.load(file)
+        scene = Scene.load(file)
+    return scene if scene.body.mass > LIGHT else replace(scene, foot=Foot.load(LIGHT_FOOT))
 
 
 def robots_of(file: pathlib.Path | None) -> dict[str, list[str]]:

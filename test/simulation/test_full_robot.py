@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.simulation import Scene
 from ros_pad.simulation.full_robot import FullRobot
@@ -420,6 +421,14 @@ def test_landings_do_not_hang_on_the_step(name, cycles, step, off):
     assert len(usual) > 10 and len(fine) > 10
     assert np.median(usual) == pytest.approx(np.median(fine), rel=off)
     assert 2e-3 < np.median(fine) < 10e-3
+
+
+def test_the_step_is_short_enough_for_stiff_soles_of_light_legs():
+    """A sole of 51 mm has 350.2 kN/m; in steps much longer than 1/ω feet bounce up."""
+    robot = FullRobot(scene_of(foot=Foot.load('large331')), DRY, 0.004)
+    leg = robot.model.geom('foot_1').bodyid[0]
+    swing = 1.0 / math.sqrt(350.2e3 * robot.model.body_invweight0[leg, 0])
+    assert 0.5 * swing < robot.model.opt.timestep <= swing < 0.9e-3
 
 
 def test_feet_whose_domes_carry_nothing_stand_on_their_soles():
