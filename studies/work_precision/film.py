@@ -239,6 +239,34 @@ def rises() -> list[dict[str, Any]]:
     return rows
 
 
+def loaded(row: dict[str, Any], step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return steps of a load history, s, and its loads, N."""
+    steps = np.arange(1, round(row['times_s'][-1] / step) + 1) * step
+    return steps, np.interp(steps, *np.array(row['force']).T)
+
+
+def reduced(row: dict[str, Any], step: float) -> np.ndarray:
+    """Return the dry share after each step of a load history, by the film of walks."""
+    foot, pressure = Foot.load('large37'), row['pressure_Pa']
+    film = Film(foot, row['viscosity_Pa_s'])
+    film.touch_down(row['initial_film_m'])
+    film.drain(foot.pads * row['force'][0][1], 0.0, pressure, 1e-6)
+    loads = (foot.pads * loaded(row, step)[1]).tolist()
+    return _dry(np.array([film.drain(load, 0.0, pressure, step)[0] for load in loads]))
+
+
+def rigid(row: dict[str, Any], step: float) -> np.ndarray:
+    """Return the same by a rigid disc."""
+    square = loaded(row, step)[1] / math.pi / row['pressure_Pa']
+    growth = 4.0 * row['pressure_Pa'] * step / (3.0 * row['viscosity_Pa_s'] * square)
+    return _dry((row['initial_film_m'] ** -2 + np.cumsum(growth)) ** -0.5)
+
+
+def shares(row: dict[str, Any], film: Callable[..., np.ndarray], step: float) -> np.ndarray:
+    """Return the dry shares of a load history at its times, by one of the films."""
+    return np.interp(row['times_s'], loaded(row, step)[0], film(row, step))
+
+
 def histories() -> list[dict[str, Any]]:
     """Return dry shares of load histories, by the film of walks and by rigid discs.
 
@@ -247,24 +275,56 @@ def histories() -> list[dict[str, Any]]:
     """
     rows = []
     for row in json.loads(HISTORIES.read_text(encoding='utf-8')):
-        pressure, times = row['pressure_Pa'], row['times_s']
-        foot, steps = Foot.load('large37'), np.arange(1, round(times[-1] / STEP) + 1) * STEP
-        loads = np.interp(steps, *np.array(row['force']).T)
-        film, shares = Film(foot, row['viscosity_Pa_s']), {}
-        film.touch_down(row['initial_film_m'])
-        film.drain(foot.pads * row['force'][0][1], 0.0, pressure, 1e-6)
         start = perf_counter()
-        films = [film.drain(foot.pads * each, 0.0, pressure, STEP)[0] for each in loads.tolist()]
-        taken = (perf_counter() - start) / len(steps)
-        radii = np.sqrt(loads / math.pi / pressure)
-        growth = 4.0 * pressure * STEP / (3.0 * row['viscosity_Pa_s'] * radii**2)
-        shares['reduced'] = _dry(np.array(films))
-        shares['rigid'] = _dry((row['initial_film_m'] ** -2 + np.cumsum(growth)) ** -0.5)
+        curves = {'reduced': reduced(row, STEP)}
+        taken = (perf_counter() - start) / len(curves['reduced'])
+        curves['rigid'] = rigid(row, STEP)
+        steps, times = loaded(row, STEP)[0], row['times_s']
         rows.append(
             {key: row[key] for key in ('name', 'times_s', 'dry_share')}
-            | {key: np.interp(times, steps, values).tolist() for key, values in shares.items()}
-            | {'curves': {key: values[::4].tolist() for key, values in shares.items()}}
+            | {key: np.interp(times, steps, values).tolist() for key, values in curves.items()}
+            | {'curves': {key: values[::4].tolist() for key, values in curves.items()}}
             | {'step_s': taken}
+        )
+    return rows
+
+
+def squeezed(row: dict[str, Any], rings: int) -> np.ndarray:
+    """Return the dry shares of a load that grows linearly and stays, by :func:`squeeze`."""
+    pressure, (rise, load) = row['pressure_Pa'], row['force'][-2]
+    outer, times = 1.6 * math.sqrt(load / math.pi / pressure), row['times_s']
+    surface = Membrane(outer, 0.5 * pressure * row['sphere_radius_m'], pressure)
+    film = squeeze(surface, row['initial_film_m'], times, load, rise=rise, rings=rings)
+    areas = np.interp(times, *np.array(row['force']).T) / pressure
+    ends = np.cumsum(film.area)
+    inside = np.clip(areas[:, None] - (ends - film.area), 0.0, film.area)
+    return np.asarray((_dry(film.thickness) * inside).sum(1) / areas)
+
+
+def costs() -> list[dict[str, Any]]:
+    """Return time, for 0.3 s of one dome, and errors of the dry share, of every film.
+
+    Over the histories whose load grows linearly and stays.
+    """
+    known = json.loads(HISTORIES.read_text(encoding='utf-8'))
+    ramps = [row for row in known if len(row['force']) < 4]
+    films: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = [
+        *((f'film of walks, {ms} ms', shares, (reduced, 1e-3 * ms)) for ms in (1, 2, 4)),
+        ('rigid discs, 1 ms', shares, (rigid, STEP)),
+        *((f'{rings} rings', squeezed, (rings,)) for rings in (25, 50, 100)),
+    ]
+    rows = []
+    for name, film, values in command.each(films, 'films', 'film'):
+        start = perf_counter()
+        errors = np.concatenate([film(row, *values) - row['dry_share'] for row in ramps])
+        taken = (perf_counter() - start) / len(ramps)
+        rows.append(
+            {
+                'film': name,
+                'time_s': taken,
+                'rms': float(np.sqrt(np.mean(errors**2))),
+                'worst': float(abs(errors).max()),
+            }
         )
     return rows
 
@@ -312,11 +372,12 @@ def landings() -> list[dict[str, Any]]:
 # --- picture and tables --------------------------------------------------------------------------
 
 
-def draw(results: Sequence[Result], kept: Sequence[dict[str, Any]]) -> Figure:
+def draw(document: dict[str, Any], results: Sequence[Result]) -> Figure:
     """Return the picture: time against error, shapes, and dry shares of load histories."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.6, 10.2), layout='constrained')
-        above, below, last = figure.subplots(3, 2)
+        at = figure.subplot_mosaic('aaabbb;cccddd;eeffgg')
+        above, below = (at['a'], at['b']), (at['c'], at['d'])
         names = list(dict.fromkeys(result.problem for result in results))
         for panel, name in zip(above, names, strict=True):
             _work(panel, [result for result in results if result.problem == name])
@@ -324,7 +385,8 @@ def draw(results: Sequence[Result], kept: Sequence[dict[str, Any]]) -> Figure:
         below[0].set_title('flat pad of Dragon Skin 10, times 1.88, under 0.3 N')
         _shapes(below[1], dome(0.19, [1e-3, 1e-2, 0.1, 1.0]), contact(0.19), AIR)
         below[1].set(title='dome of 75 kPa under 0.19 N', ylim=(3e-2, 1e3))
-        _histories(last[0], last[1], kept)
+        _histories(at['e'], at['f'], document['histories'])
+        _costs(at['g'], document['costs'])
     return figure
 
 
@@ -344,6 +406,22 @@ def _histories(left: Any, right: Any, rows: Sequence[dict[str, Any]]) -> None:
     left.set(ylabel='dry share after 0.3 s', title='dome of 70 kPa under 0.185 N')
     right.set(ylim=(0, 1), xlabel='time in stance (ms)', title='a stance of hexapod_patches')
     left.legend(frameon=False, fontsize=7)
+
+
+def _costs(panel: Any, rows: Sequence[dict[str, Any]]) -> None:
+    """Draw time against error of the dry share."""
+    for row in rows:
+        walks, rings = row['film'].startswith('film'), 'rings' in row['film']
+        colour = BLUE if walks else GREEN if rings else VERMILION
+        x, low, high = 1e3 * row['time_s'], 100.0 * row['rms'], 100.0 * row['worst']
+        panel.plot([x, x], [low, high], '-_', color=colour, lw=1.2)
+        panel.plot(x, low, 'o', color=colour, ms=5)
+        words = row['film'].removeprefix('film of walks, ')
+        panel.annotate(words, (x, high), (0, 3), textcoords='offset points', ha='center',
+                       fontsize=6.5, color=colour)  # fmt: skip
+    panel.set(xscale='log', yscale='log', title='six loads that rise and stay')
+    panel.set(xlabel='time for 0.3 s of a film (ms)', ylabel='error of dry share, points')
+    panel.margins(x=0.2, y=0.15)
 
 
 def _work(panel: Any, results: Sequence[Result]) -> None:
@@ -391,10 +469,11 @@ def main(words: Sequence[str]) -> int:
         'rises': rises(),
         'landings': landings(),
         'histories': histories(),
+        'costs': costs(),
     }
-    figure = draw(results, document['histories'])
+    figure = draw(document, results)
     kept = command.write(options.out, 'film', document, {'film': figure})
-    parts = ('rows', 'soles', 'domes', 'rises', 'landings', 'histories')
+    parts = ('rows', 'soles', 'domes', 'rises', 'landings', 'histories', 'costs')
     texts = (command.listed(document[part], f'\n{part}') for part in parts)
     command.show(options, kept, '\n'.join(texts))
     return 0

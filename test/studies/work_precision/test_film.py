@@ -26,6 +26,14 @@ def test_histories_beside_the_reference():
     assert np.sqrt(np.mean(off['reduced'] ** 2)) < 0.03 < 0.3 < np.sqrt(np.mean(off['rigid'] ** 2))
 
 
+def test_kept_costs_of_films(document):
+    """Shorter steps and more rings are nearer to the reference; rigid discs are not near at all."""
+    errors = {row['film']: row['rms'] for row in document['costs']}
+    assert errors['film of walks, 1 ms'] < 0.03 < errors['film of walks, 4 ms']
+    assert errors['100 rings'] < errors['50 rings'] < errors['25 rings'] < 0.15
+    assert errors['rigid discs, 1 ms'] > 0.3
+
+
 def test_kept_figures_have_the_closed_forms(document):
     """Stefan after 1 s and 3 s; lens of uniform pressure, (16/3 - 4)/π p a/E*."""
     for row in document['soles']:
