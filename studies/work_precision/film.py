@@ -417,8 +417,8 @@ def _costs(panel: Any, rows: Sequence[dict[str, Any]]) -> None:
         panel.plot([x, x], [low, high], '-_', color=colour, lw=1.2)
         panel.plot(x, low, 'o', color=colour, ms=5)
         words = row['film'].removeprefix('film of walks, ')
-        panel.annotate(words, (x, high), (0, 3), textcoords='offset points', ha='center',
-                       fontsize=6.5, color=colour)  # fmt: skip
+        panel.annotate(words, (x, low), (-5 if rings else 5, -2), textcoords='offset points',
+                       ha='right' if rings else 'left', fontsize=6.5, color=colour)  # fmt: skip
     panel.set(xscale='log', yscale='log', title='six loads that rise and stay')
     panel.set(xlabel='time for 0.3 s of a film (ms)', ylabel='error of dry share, points')
     panel.margins(x=0.2, y=0.15)
