@@ -27,7 +27,7 @@ FILM = 6
 ) = range(FILM)  # fmt: skip
 
 LEAST = 1e-9  # N; below it a dome has no contact
-LONGEST = 2e-3  # s, step of a film under domes; longer ones are divided
+LONGEST, MOST = 2e-3, 1000  # s, step of a film under domes; longer ones are divided, in so many
 SLOW = 0.05  # A contact grows or shrinks slowly that lays less than this share of the film inside.
 
 # Gauss' points of the rim, and their weights.
@@ -92,7 +92,7 @@ def drained(
     if on_domes > LEAST:
         area = on_domes / (foot.pads * pressure)
         sphere = between(foot.spheres, pressure / foot.limit_cell)
-        before, parts = film[AREA], int(time / LONGEST - 1e-9) + 1
+        before, parts = film[AREA], min(int(time / LONGEST - 1e-9) + 1, MOST)
         for part in range(1, parts + 1):
             then = before + (area - before) * part / parts
             spread(foot, film, then, pressure, sphere, time / parts)
