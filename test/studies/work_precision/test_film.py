@@ -27,7 +27,7 @@ def test_histories_beside_the_reference():
 
 
 def test_kept_costs_of_films(document):
-    """Shorter steps and more rings are nearer to the reference; rigid discs are not near at all."""
+    """Shorter steps and more rings are nearer to the reference; rigid discs are far from it."""
     errors = {row['film']: row['rms'] for row in document['costs']}
     assert errors['film of walks, 1 ms'] < 0.03 < errors['film of walks, 4 ms']
     assert errors['100 rings'] < errors['50 rings'] < errors['25 rings'] < 0.15
