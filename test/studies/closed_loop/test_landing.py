@@ -128,11 +128,6 @@ def test_the_page_has_the_figures_of_the_last_run():
     domes = landing.interval(row(of_six)['to usual'])
     placed = row(of_six, landing='150 mm/s')['to usual']['of_means']
     assert f'domes go {domes} times as far, but {placed:.3f} if' in text
-    viscous = '5 mPa s, sled slides badly'
-    gains = [
-        landing.interval(row(of_six, viscous, each)['to as fast']) for each in landing.POLICIES
-    ]
-    assert 'dome {}, adaptive {}'.format(*gains) in text
     assert f'towed ({landing.interval(row(of_four, "90 N towed")["to usual"])})' in text
     # In the printed digits no others gain beyond chance, except by landing over one place.
     gaining = [
@@ -144,7 +139,7 @@ def test_the_page_has_the_figures_of_the_last_run():
         if min(row(robot, ground, policy)[each]['low'] for each in ('to usual', 'to as fast'))
         > 1.0005
     ]
-    assert gaining == [(viscous, 'dome'), (viscous, 'adaptive'), ('90 N towed', 'dome')]
+    assert gaining == [('90 N towed', 'dome')]
 
 
 def invented(job):
