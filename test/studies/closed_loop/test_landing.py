@@ -120,7 +120,7 @@ def test_the_page_has_the_figures_of_the_last_run():
         round(100 * (row(robot)['dry_share'] - row(robot, landing='usual')['dry_share']))
         for robot in (of_six, of_four)
     ]
-    assert '{} and {} points drier'.format(*drier) in text
+    assert 'changes by {} and {} points'.format(*drier) in text
     said = [
         landing.interval(row(robot, policy='adaptive')['to usual']) for robot in (of_six, of_four)
     ]
