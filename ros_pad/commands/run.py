@@ -280,7 +280,7 @@ def _show(trial: Trial) -> None:
     for row in rows:
         advance, gain = row['distance_per_cycle_m'], ''
         if row is not rows[0] and own.distance_per_cycle_m:
-            gain = f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+.0f} %'
+            gain = f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+z.0f} %'
         slip = sum(row['slip_path_m']) / len(row['slip_path_m'])
         switches = str(sum(row['switches']))
         table.append([row['policy'], f'{1e3 * advance:.1f}', gain, f'{slip:.2f} m', switches])

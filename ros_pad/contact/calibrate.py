@@ -305,11 +305,7 @@ def _modelled_forces(friction: Friction, foot: Foot, floor: tuple[float, float])
     ):
         film = Film(foot, floor[1])
         film.touch_down(floor[0])
-        forces.append(
-            foot.grip_after(load, pressure, film, stance_time)
-            if wet
-            else foot.grip(load, pressure)
-        )
+        forces.append(foot.grip_after(load, pressure, film if wet else None, stance_time))
     return np.array(forces)
 
 

@@ -374,11 +374,13 @@ class Foot:
             films = film.drain(on_domes, on_sole, pressure, duration, slip)
         return laws.resistance(self, on_domes, on_sole, pressure, *films)
 
-    def grip_after(self, load: float, pressure: float, film: Film, time: float) -> float:
-        """Return the tangential resistance, N, after a time in stance on a film, s.
+    def grip_after(self, load: float, pressure: float, film: Film | None, time: float) -> float:
+        """Return the tangential resistance, N, after a time in stance, s; None is dry ground.
 
         The film has just been touched; for speed the input is not checked.
         """
+        if film is None:
+            return self.grip(load, pressure)
         on_domes = self.dome_load(load, pressure)
         films = film.stand(on_domes, load - on_domes, pressure, time)
         return laws.resistance(self, on_domes, load - on_domes, pressure, *films)

@@ -371,11 +371,7 @@ def _capacity(inputs: Inputs, foot: Foot, loads: Array, pressure: float, wet: bo
     film = Film(rough)
     for load in loads.tolist():
         film.touch_down(inputs['film'])
-        found.append(
-            rough.grip_after(load, pressure, film, inputs['stand'])
-            if wet
-            else rough.grip(load, pressure)
-        )
+        found.append(rough.grip_after(load, pressure, film if wet else None, inputs['stand']))
     return np.array(found)
 
 
