@@ -18,7 +18,6 @@ from ros_pad.sensing.body_filter import GATE, GRAVITY, BodyFilter, Flags
 from ros_pad.sensing.motion import BodyEstimate, FootMotion, Sample, checked
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
 from ros_pad.sensing.settings import SETTINGS
-from ros_pad.sensing.slip_window import SlipWindow
 
 WEIGHT = -float(GRAVITY[2])  # m/s²
 
@@ -36,14 +35,25 @@ RECOVERY = 0.3
 # velocities differ by less than this, m/s.
 LOST, ALIKE = 2.0, 0.03
 
-# Relative error of the length of the legs above which that of the robot's file is wrong, and its
-# deviation below which it is known again.
-WRONG_LENGTH, KNOWN_LENGTH = 0.06, 0.012
+# Time for which a foot must have been slow before it counts as standing: after it has slipped,
+# and after it has landed, as it skids then, s.
+PATIENCE, LANDING = 0.03, 0.012
+
+# Slip velocity of a foot that does not stand, in standard deviations.
+TOO_FAST = 5.0
+
+# What a body shakes between samples, which the accelerometer shows in part, m/s².
+SHAKES = 0.1
+
+# Error of the place of a foot by the kinematics, each component, m.
+KINEMATICS = 5e-4
 
 # Deviation of the rotation after a time without readings of the IMU, rad.
 BLIND_TURN = 0.1
 
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
+
+_ROLLS = np.array(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))  # w @ _ROLLS = w x z
 
 
 def forces_of(chains: Chains, kinematics: Kinematics, efforts: Array, gravity: Array) -> Array:
@@ -89,7 +99,7 @@ class BodyEstimator:
     ...     estimate = estimator.update(
     ...         time, [0, 0, 0], [0, 0, 9.81], joints, 0 * joints, foot_forces=forces
     ...     )
-    >>> bool(np.linalg.norm(estimate.velocity) < 1e-3), [foot.left_out for foot in estimate.feet]
+    >>> bool(np.linalg.norm(estimate.velocity) < 1e-3), [foot.excluded for foot in estimate.feet]
     (True, [False, False, False, False])
     """
 
@@ -105,18 +115,17 @@ class BodyEstimator:
         errors = np.zeros((9, 9))
         errors[:3, 6:9] = errors[3:6, :3] = errors[6:9, 3:6] = np.eye(3)
         to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
-        hips = np.concatenate([robot.hips, np.ones((len(robot.legs), 1))], axis=1)
         load = robot.mass * WEIGHT / (0.5 * len(robot.legs))
-        sizes = (0.05 * robot.foot_radius, 0.003) if self._given.sizes else (0.0, 0.0)
-        self._body = motion.Body(errors, to_imu, (hips @ to_imu.T)[:, :3], load, sizes)
+        self._body = motion.Body(errors, to_imu, load)
         self._reset()
 
     def _reset(self) -> None:
         """Discard everything."""
         robot, given, legs = self._robot, self._given, len(self._robot.legs)
         gate = GATE if given.rejection else math.inf
-        self._filter = BodyFilter(legs, given.gyro_noise, given.accelerometer_noise, gate)
-        self._window = SlipWindow(legs, given.encoder_noise, given.velocity_noise)
+        self._filter = BodyFilter(
+            legs, given.gyro_noise, math.hypot(given.accelerometer_noise, SHAKES), gate
+        )
         self._time = math.nan
         self._step = 0.0  # the last one, s
         self._feet = motion.Feet(legs)
@@ -128,8 +137,6 @@ class BodyEstimator:
             Delay(given.gyro_noise),
             Unloaded(robot.legs, self._body.load),
         )
-        # Whether legs are of another length than in the file, and when it is looked at again.
-        self._stretched, self._look = False, math.nan
         self._rests = motion.Rest()
         self._pull = WEIGHT  # mean size of the specific force, m/s²
 
@@ -205,16 +212,6 @@ class BodyEstimator:
         """Delay of the joints behind the IMU, and its standard deviation, s; NaN until known."""
         return self._checks.delay.value, self._checks.delay.deviation
 
-    @property
-    def foot_radius(self) -> tuple[float, float]:
-        """Radius with which feet roll, as estimated, and its standard deviation, m."""
-        return self._filter.radius, self._filter.deviations[0]
-
-    @property
-    def length_error(self) -> tuple[float, float]:
-        """Relative error of the length of the legs, as estimated, and its standard deviation."""
-        return self._filter.scale, self._filter.deviations[1]
-
     def _forces(
         self,
         time: float,
@@ -251,9 +248,7 @@ class BodyEstimator:
         body.spread(
             *((tilt + 2e-3, 0.02) if calm else (0.2, 0.5)),
             *(UNKNOWN_BIAS, max(given.accelerometer_bias, 1e-3)),
-            *self._body.sizes,
         )
-        body.radius = self._robot.foot_radius
         # The least rotation that turns the reading of the IMU upright, then the base to x.
         up = self._robot.imu[:3, :3] @ accelerometer / max(strength, 1e-9)
         axis = cross(up, np.array((0.0, 0.0, 1.0)))
@@ -284,34 +279,31 @@ class BodyEstimator:
         if dt > LONGEST_STEP:
             self._feet.sliding_since = time
             self._feet.standing[:] = False  # their footholds are made anew
-        self._feet.spin[~self._feet.standing] = 0.0
         # What happened in a gap is unknown: the body is taken to have stood.
         step = dt if dt <= LONGEST_GAP else 0.0
-        mean = self._filter.predict(step, gyro, accelerometer, self._feet.spin)
-        self._feet.moved = step * (mean - self._filter.radius * self._feet.spin)
+        rolling = np.where(self._feet.standing[:, None], self._rolling(sample), 0.0)
+        self._filter.predict(step, gyro, accelerometer, rolling)
         # One reading after a gap says nothing about the time without readings.
         self._pull += (math.sqrt(accelerometer @ accelerometer) - self._pull) * step
         return step
 
+    def _rolling(self, sample: Sample) -> Array:
+        """Return the velocities with which the feet roll on level ground, (legs, 3), m/s."""
+        turning = (sample.kinematics.angular @ sample.rates[..., None])[..., 0]
+        turning = (turning + sample.gyro - self._filter.gyro_bias) @ self._filter.turn.T
+        return self._robot.foot_radius * (turning @ _ROLLS)
+
     def _process(self, sample: Sample, dt: float) -> BodyEstimate:
         """Correct the filter with the feet, and return the estimate."""
         time, gyro, _, kinematics, dq, forces = sample
-        body, legs = self._filter, len(self._feet.standing)
+        body, feet = self._filter, self._feet
         lands = self._load(sample)
-        turn = body.turn
-        places, hips = self._placed(kinematics, turn)
-        lines = turn @ kinematics.jacobians
+        free = np.repeat(~feet.standing | lands | self._checks.legs.against, 3).reshape(-1, 3)
+        free[:, :2] |= feet.excluded[:, None]
+        lines = body.turn @ kinematics.jacobians
         squares = lines @ lines.transpose(0, 2, 1)
-        # Kinematics are not quite right.
-        noise = self._given.encoder_noise**2 * squares + 1e-4**2 * np.eye(3)
-        body.set_down(lands, places, hips, noise)
-        judged = np.zeros((2, legs), dtype=bool)
-        if self._feet.standing.any():
-            fixed = not self._checks.legs.agree or bool(
-                np.abs(dq).max() < 0.02 + 5.0 * self._given.velocity_noise
-            )
-            trusted = self._feet.standing & ~self._checks.legs.against
-            judged = body.stand(places, hips, noise, trusted, self._feet.left_out, fixed)
+        noise = self._given.encoder_noise**2 * squares + KINEMATICS**2 * np.eye(3)
+        moved = body.stand(kinematics.positions @ body.turn.T, noise, free)
         if not body.sound():
             # Begin anew after readings that no robot can have made.
             self._reset()
@@ -321,40 +313,26 @@ class BodyEstimator:
             return self._process(sample, 0.0)
         self._rest(sample)
         turn = body.turn
-        places, hips = self._placed(kinematics, turn)
         rate = gyro - body.gyro_bias
-        turning = (kinematics.angular @ dq[..., None])[..., 0] + rate
-        swaying = (1.0 + body.scale) * (kinematics.jacobians @ dq[..., None])[..., 0]
-        swaying += (places @ turn) @ skew(rate).T
-        moving, turning = (np.concatenate([swaying, turning]) @ turn.T).reshape(2, legs, 3)
+        moving = (kinematics.jacobians @ dq[..., None])[..., 0]
+        moving = (moving + kinematics.positions @ skew(rate).T) @ turn.T
         velocities = body.velocity + moving
-        self._feet.climbing = velocities[:, 2]
-        self._feet.spin = np.stack([turning[:, 1], -turning[:, 0], np.zeros(legs)], axis=1)
-        slips = velocities - body.radius * self._feet.spin
-        window = self._window
-        window.update(time, self._feet.moved, places, slips, lands)
+        feet.climbing = velocities[:, 2]
+        slips = velocities - self._rolling(sample)
+        feet.smooth(dt, slips[:, :2], lands)
         variance = body.covariance
         common = 0.5 * (variance[3, 3] + variance[4, 4])
         lever = 0.5 * (squares[:, 0, 0] + squares[:, 1, 1])
-        white = window.lever_noise**2 * lever
-        deviations = np.sqrt(white + common)
-        latest = np.sqrt(window.latest_noise**2 * lever + common)
-        self._judge(time, judged, deviations, latest, (places, hips, noise))
-        speeds = np.hypot(window.velocity[:, 0], window.velocity[:, 1])
-        sticking = self._feet.standing & (speeds < 0.05)  # m/s
-        self._checks.delay.update(time, turn @ rate, places, slips, sticking)
-        moves = np.hypot(moving[:, 0], moving[:, 1])
-        if self._compare(time, dt, speeds, moves):
-            body.set_down(self._feet.standing, places, hips, noise)
-        # Velocities that vary in their window are not independent of their neighbours.
-        deviations = np.sqrt(np.maximum(white, 1.5 * window.unsteady) + common)
-        return self._estimate(time, rate, places, velocities, forces, deviations)
-
-    def _placed(self, kinematics: Kinematics, turn: Array) -> tuple[Array, Array]:
-        """Return feet and hips from the IMU, (legs, 3), m, in odom axes."""
-        hips = self._body.hips @ turn.T
+        deviations = np.sqrt(feet.white * self._given.velocity_noise**2 * lever + common)
+        self._judge(time, moved[:, 0], deviations)
         places = kinematics.positions @ turn.T
-        return places + self._filter.scale * (places - hips), hips
+        speeds = np.hypot(feet.slip[:, 0], feet.slip[:, 1])
+        sticking = feet.standing & (speeds < 0.05)  # m/s
+        self._checks.delay.update(time, turn @ rate, places, slips, sticking)
+        self._checks.legs.update(
+            dt, feet.standing, feet.excluded, speeds, np.hypot(moving[:, 0], moving[:, 1])
+        )
+        return self._estimate(time, rate, places, velocities, forces, deviations)
 
     def _load(self, sample: Sample) -> Flags:
         """Update which feet stand; return those that landed with this sample."""
@@ -368,90 +346,38 @@ class BodyEstimator:
         gate = share * self._body.load
         self._feet.standing = loads > np.where(before, gate, gate + 3.0 * self._given.force_noise)
         lands = self._feet.standing & ~before
-        self._feet.left_out &= self._feet.standing
+        self._feet.excluded &= self._feet.standing
         if self._given.rejection:
-            self._feet.left_out |= lands
-            self._feet.patience[lands] = 0.012  # it skids first
-            self._feet.slow_since[lands] = math.inf
+            pass
         return lands
 
-    def _judge(
-        self,
-        time: float,
-        judged: Flags,
-        deviations: Array,
-        latest: Array,
-        feet: tuple[Array, Array, Array],
-    ) -> None:
-        """Update which feet slip: those that slip have a foothold only in height."""
+    def _judge(self, time: float, moved: Flags, deviations: Array) -> None:
+        """Update which feet are excluded, from those that have moved and deviations of slip."""
         if not self._given.rejection:
             return
-        state, slips, (rejected, lifted) = self._feet, self._window.velocity, judged
-        speeds = np.hypot(slips[:, 0], slips[:, 1])
-        fresh = state.standing & ~state.left_out
-        fresh &= rejected | (speeds > 4.0 * deviations)
-        state.patience[fresh] = 0.03
-        now = self._window.latest
-        slow = state.standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < 2.5 * latest)
-        state.slow_since = np.where(slow, np.minimum(state.slow_since, time), math.inf)
-        state.left_out |= fresh
-        state.left_out &= ~(time - state.slow_since >= state.patience)
-        if state.left_out.any():
-            self._filter.set_down(state.left_out & ~lifted, *feet, level=True)
-        if lifted.any():
-            self._filter.set_down(lifted, *feet)
-        sticking = state.standing & ~state.left_out
+        feet = self._feet
+        speeds = np.hypot(feet.slip[:, 0], feet.slip[:, 1])
+        fresh = feet.standing & ~feet.excluded & (moved | (speeds > TOO_FAST * deviations))
+        slow = feet.standing & ~fresh & (speeds < 2.5 * deviations)
+        feet.slow_since = np.where(slow, np.minimum(feet.slow_since, time), math.inf)
+        feet.excluded |= fresh
+        feet.excluded &= ~(time - feet.slow_since >= PATIENCE)
+        sticking = feet.standing & ~feet.excluded
         if sticking.any():
-            state.held = time
-        if sticking.any() or not state.standing.any():
-            state.sliding_since = time
+            feet.held = time
+        if sticking.any() or not feet.standing.any():
+            feet.sliding_since = time
         elif (
-            time - state.sliding_since > LOST
-            and state.standing.sum() > 1
-            and np.ptp(slips[state.standing, :2], axis=0).max() < ALIKE
+            time - feet.sliding_since > LOST
+            and feet.standing.sum() > 1
+            and np.ptp(feet.slip[feet.standing], axis=0).max() < ALIKE
         ):
             # All feet that slip alike for so long stick, and the velocity is wrong.
             self._filter.lose()
-            state.left_out[:] = False
-            state.held = state.sliding_since = time
+            feet.excluded[:] = False
+            feet.held = feet.sliding_since = time
             text = 'slipping: all feet slipped alike, velocity is estimated anew'
             self._doubts.add(time, text)
-
-    def _compare(self, time: float, dt: float, slips: Array, moves: Array) -> bool:
-        """Compare the legs with each other, and their length with that of the robot's file.
-
-        Return whether what was learnt about them was discarded.
-        """
-        feet, legs, (radius_error, length_error) = self._feet, self._checks.legs, self._body.sizes
-        changed = legs.update(dt, feet.standing, feet.left_out, slips, moves)
-        if changed or self._checks.unloaded.found:
-            # What such legs, or feet that were in the air, have shown is wrong.
-            self._filter.reshape(self._robot.foot_radius, radius_error, 0.0, length_error)
-            return True
-        self._filter.creep = 0.03 * legs.slippery  # m after 1 s
-        # Joints that are late look like legs of another length, too.
-        if time < self._look or self._checks.delay.doubt():
-            return False
-        self._look = time + 0.25
-        scale, deviation = self._filter.scale, self._filter.deviations[1]
-        if self._stretched:
-            if deviation > KNOWN_LENGTH:
-                self._doubts.add(
-                    time,
-                    'kinematics: legs seem to be longer or shorter than in the file of the'
-                    f' robot, by {100.0 * scale:.0f} +- {100.0 * deviation:.0f} %',
-                )
-            return False
-        learnt = length_error**2 - deviation**2
-        # Feet that slip for most of their stances look like legs of another length. Walking must
-        # have shown something about it.
-        if not legs.sticks or learnt <= 0.05 * length_error**2:
-            return False
-        most = max(WRONG_LENGTH * learnt / length_error**2, 4.0 * math.sqrt(learnt))
-        self._stretched = abs(scale) > most
-        if self._stretched:
-            self._filter.reshape(self._robot.foot_radius, radius_error, 0.0, 0.05)
-        return self._stretched
 
     def _rest(self, sample: Sample) -> None:
         """Average the gyro while nothing moves, and correct its bias."""
@@ -488,9 +414,8 @@ class BodyEstimator:
         to_odom = turn @ self._body.to_imu[:3, :3]
         centres = places + body.position
         loads = np.zeros_like(places) if forces is None else forces @ turn.T
-        slips = self._window.velocity[:, :2]
-        stands, left_out = self._feet.standing, self._feet.standing & self._feet.left_out
-        flags = stands.tolist(), slips, deviations.tolist(), left_out.tolist()
+        state = self._feet
+        flags = state.standing.tolist(), state.slip.copy(), deviations.tolist(), state.excluded.tolist()
         feet = tuple(map(FootMotion, centres, velocities, loads, *flags))
         velocity = body.velocity + turn @ cross(rate, self._body.to_imu[:3, 3])
         # From the filter's errors to those of the base: rotation moves it about the IMU.

@@ -17,6 +17,12 @@ from ros_pad.robots.rotation import Array
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
 
 
+SMOOTHING = 0.01
+"""Time constant of the slip velocity, s: as sluggish as a mean over twice that."""
+
+Flags = npt.NDArray[np.bool_]
+
+
 class FootMotion(NamedTuple):
     """One foot after a sample; all vectors in odom axes.
 
@@ -35,7 +41,7 @@ class FootMotion(NamedTuple):
     slip_velocity_sd : float
         Standard deviation of each of its components, m/s. It includes that of the body's
         velocity, which is common to all feet and lasts for about a stance.
-    left_out : bool
+    excluded : bool
         Whether the foot carries load but is left out of the estimate of the body, but for its
         height: it is not consistent with standing still, or has landed less than 12 ms ago.
     """
@@ -46,7 +52,7 @@ class FootMotion(NamedTuple):
     in_contact: bool
     slip_velocity: Array
     slip_velocity_sd: float
-    left_out: bool
+    excluded: bool
 
 
 class BodyEstimate(NamedTuple):
@@ -103,9 +109,6 @@ class Given(NamedTuple):
     force_axes : str
         ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
         of the feet.
-    sizes : bool
-        Whether the radius with which feet roll (soft feet sink in), and the relative error of the
-        length of all legs are estimated; otherwise they are those of the robot.
     rejection : bool
         Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
     """
@@ -118,7 +121,6 @@ class Given(NamedTuple):
     accelerometer_bias: float = 0.05
     contact_share: float = 0.0
     force_axes: str = 'base'
-    sizes: bool = True
     rejection: bool = True
 
 
@@ -138,9 +140,7 @@ class Body(NamedTuple):
 
     errors: Array  # (9, 9): from errors of the filter to those of the base
     to_imu: Array  # (4, 4)
-    hips: Array  # (legs, 3), from the IMU, m
     load: float  # N, that a foot is expected to carry
-    sizes: tuple[float, float]  # deviations of the radius of rolling, m, and of lengths, relative
 
 
 class Checks(NamedTuple):
@@ -159,14 +159,22 @@ class Feet:
     def __init__(self, legs: int) -> None:
         self.measured = True  # whether forces are measured, not computed from torques
         self.standing = np.zeros(legs, dtype=bool)
-        self.left_out = np.zeros(legs, dtype=bool)  # of the filter, but for their height
+        self.excluded = np.zeros(legs, dtype=bool)  # from the filter, but for their height
         self.slow_since = np.full(legs, math.inf)
-        self.patience = np.full(legs, 0.03)  # s for which they must be slow before they stick
-        self.spin = np.zeros((legs, 3))  # velocity of rolling for a radius of 1 m, 1/s
-        self.moved = np.zeros((legs, 3))  # by body and rolling since the last sample, m
+        self.patience = np.zeros(legs)  # s for which they must be slow before they stick
+        self.slip = np.zeros((legs, 2))  # smoothed velocity of the contact points, m/s
+        self.white = np.ones(legs)  # share of the variance of a sample that is left in it
+        self._age = np.zeros(legs)  # of the stance, s
         self.climbing = np.zeros(legs)  # vertical speeds, m/s
         self.held = math.inf  # when a foot last stuck
         self.sliding_since = math.inf  # since when feet stand and none of them sticks
+
+    def smooth(self, dt: float, slips: Array, lands: Flags) -> None:
+        """Smooth the velocities of the contact points, (legs, 2), m/s, from touch-down on."""
+        self._age = np.where(lands, 0.0, self._age + dt)
+        share = dt / np.minimum(self._age + dt, SMOOTHING + dt) if dt else np.ones_like(self._age)
+        self.slip += share[:, None] * (slips - self.slip)
+        self.white = (1.0 - share) ** 2 * self.white + share**2
 
 
 @dataclass

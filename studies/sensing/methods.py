@@ -39,16 +39,15 @@ class Track(NamedTuple):
 def estimator_for(robot: Robot, course: Course, **arguments: Any) -> BodyEstimator:
     """Return an estimator that knows the noise of a course."""
     noise = course.noise
-    return BodyEstimator(
-        robot,
-        gyro_noise=noise.gyro,
-        accelerometer_noise=noise.accelerometer,
-        encoder_noise=noise.encoder,
-        velocity_noise=noise.velocity,
-        force_noise=noise.force,
-        accelerometer_bias=noise.accelerometer_bias,
-        **arguments,
-    )
+    settings = {
+        'gyro_noise': noise.gyro,
+        'accelerometer_noise': noise.accelerometer,
+        'encoder_noise': noise.encoder,
+        'velocity_noise': noise.velocity,
+        'force_noise': noise.force,
+        'accelerometer_bias': noise.accelerometer_bias,
+    }
+    return BodyEstimator(robot, **(settings | arguments))
 
 
 def readings(log: Log) -> Iterable[tuple[Any, ...]]:
@@ -73,7 +72,7 @@ def estimated(robot: Robot, log: Log, course: Course, **arguments: Any) -> Track
         slip_deviation=np.array([[foot.slip_velocity_sd for foot in row] for row in feet]),
         standing=np.array([[foot.in_contact for foot in row] for row in feet]),
         force=np.array([[foot.force for foot in row] for row in feet]),
-        slipping=np.array([[foot.left_out for foot in row] for row in feet]),
+        slipping=np.array([[foot.excluded for foot in row] for row in feet]),
         doubt=np.array([bool(each.doubt) for each in found]),
         seconds=seconds,
     )

@@ -115,7 +115,7 @@ def mean_slip(log: Log, rate: float) -> Array:
 def measure(name: str, seed: int, duration: float) -> list[Row]:
     """Return the figures of every method on one walk."""
     course = COURSES[name]
-    robot, rate = Robot.load(course.robot), course.rate
+    robot, rate = robot_of(course.robot), course.rate
     log = walk(course, seed, duration)
     walking = log.time > REST + RAMP
     path = float(np.linalg.norm(np.diff(log.position[:, :2], axis=0), axis=1).sum())

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+import pathlib
+import re
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,7 +51,13 @@ class Drive(NamedTuple):
 HEAVY = Noise(gyro=0.02, accelerometer=0.3, accelerometer_bias=0.2)
 """Noise of a cheap IMU."""
 
-DRIVES = {'go2': Drive(0.3, 80.0, 3.0, 40.0, 0.01), 'ch3r': Drive(0.13, 18.8, 0.18, 0.94, 2e-3)}
+DRIVES = {
+    'go2': Drive(0.3, 80.0, 3.0, 40.0, 0.01),
+    'ch3r': Drive(0.13, 18.8, 0.18, 0.94, 2e-3),
+    'go2_sim': Drive(0.3, 80.0, 3.0, 45.0, 0.01),
+}
+REFERENCE = pathlib.Path(__file__).resolve().parents[2] / 'test' / 'reference'
+REFERENCE_LEGS = ('FL', 'FR', 'RL', 'RR')
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,7 @@ class Course:
     Attributes
     ----------
     robot : str
-        ``go2`` or ``ch3r``.
+        ``go2`` or ``ch3r``, or ``go2_sim``: the model of the independent walk in test/reference.
     floor : str
         ``dry``, ``patches`` or ``ice``.
     push : float
@@ -100,9 +108,34 @@ class Log:
     load: Array
 
 
+def robot_of(name: str) -> Robot:
+    """Return the robot of a course."""
+    if name != 'go2_sim':
+        return Robot.load(name)
+    feet = [f'{leg}_foot' for leg in REFERENCE_LEGS]
+    robot = Robot.load(REFERENCE / 'go2_sim.urdf', feet, 'imu', 0.022)
+    ours = Robot.load('go2')
+    return replace(robot, gait=ours.gait, home=ours.home)
+
+
+def foreign(robot: Robot, drive: Drive) -> str:
+    """Return the model of others in test/reference, with position servos for its motors."""
+    servos = ''.join(
+        f'<position joint="{name}" kp="{drive.stiffness}" kv="{drive.damping}"'
+        f' forcerange="{-drive.torque} {drive.torque}"/>'
+        for name in robot.joint_names
+    )
+    text = (REFERENCE / 'go2_sim.xml').read_text()
+    for index, leg in enumerate(REFERENCE_LEGS):
+        text = text.replace(f'geom name="{leg}"', f'geom name="foot_{index}"')
+    return re.sub('<actuator>.*</actuator>', f'<actuator>{servos}</actuator>', text)
+
+
 def model_of(robot: Robot, course: Course) -> str:
     """Return a robot on a floor, one plane for each foot, in MuJoCo's XML."""
     drive = DRIVES[course.robot]
+    if course.robot == 'go2_sim':
+        return foreign(robot, drive)
     trees, pairs, servos = [], [], []
     carried = 0.0
     for index, joints in enumerate(robot.chains.legs):
@@ -218,7 +251,7 @@ def walk(course: Course, seed: int, duration: float) -> Log:
     """
     import mujoco
 
-    robot, drive = Robot.load(course.robot), DRIVES[course.robot]
+    robot, drive = robot_of(course.robot), DRIVES[course.robot]
     gait = robot.gait
     assert gait is not None
     generator = np.random.default_rng(seed)
@@ -237,6 +270,7 @@ def walk(course: Course, seed: int, duration: float) -> Log:
     pushes = _Pushes(course.push, robot.mass * 9.81, generator)
     for _ in range(round(SETTLE * course.rate * SUBSTEPS)):
         mujoco.mj_step(model, data)
+    speed = _imu_velocity(robot, data)
     for tick in range(round(duration * course.rate)):
         time = tick / course.rate
         if time > REST:
@@ -252,20 +286,21 @@ def walk(course: Course, seed: int, duration: float) -> Log:
             data.xfrc_applied[1, :2] = pushes.force(time)
         # Servos follow a line between set-points: steps in time with the samples would alias.
         change = (aim - data.ctrl) / SUBSTEPS
-        speeds = []
-        for part in range(SUBSTEPS):
+        for _ in range(SUBSTEPS):
             data.ctrl += change
             for index, geom in enumerate(feet):
                 x, y, _ = data.geom_xpos[geom].tolist()
                 grip = ground.friction(x, y) if time > REST else START_FRICTION
-                model.pair_friction[index, :2] = grip
+                if model.npair:
+                    model.pair_friction[index, :2] = grip
+                else:
+                    model.geom_friction[geom, 0] = grip
             mujoco.mj_step(model, data)
-            speeds.append(_imu_velocity(robot, data))
-            if part == SUBSTEPS - 2:
-                mujoco.mj_forward(model, data)  # all readings are of this moment
-                _read(mujoco, model, data, feet, rows)
-        # MuJoCo's accelerometer is of an explicit step, the motion that of an implicit one.
-        acceleration = (speeds[-1] - speeds[-3]) * course.rate * SUBSTEPS / 2.0
+        mujoco.mj_forward(model, data)  # all readings are of this moment
+        _read(mujoco, model, data, feet, rows)
+        # Accelerometers average. MuJoCo's own is of an explicit step, the motion of an implicit one.
+        speed, last = _imu_velocity(robot, data), speed
+        acceleration = (speed - last) * course.rate
         rows['accelerometer'].append(_specific_force(robot, model, rows, acceleration))
         rows['time'].append(time)
     log = Log(**{key: np.array(value) for key, value in rows.items()})
@@ -353,6 +388,9 @@ COURSES = {
     'ice': Course(floor='ice'),
     'hexapod': Course('ch3r', 'patches'),
     'long pushes, ice': Course(floor='ice', push=0.6),
+    'model of others, dry': Course('go2_sim'),
+    'model of others, patches': Course('go2_sim', 'patches'),
+    'model of others, ice': Course('go2_sim', 'ice'),
     'cheap IMU': Course(floor='patches', noise=HEAVY),
 }
 """The walks of the study; constants of the estimator were chosen on seeds below 101."""
