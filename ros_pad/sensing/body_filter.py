@@ -32,8 +32,8 @@ _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 _GYRO, _FORCE = slice(9, 12), slice(12, 15)
 FEET = 15
 
-# Random motion of feet that stand, m after 1 s.
-STRAY = 1e-3
+# Random motion of feet that stand, m after 1 s, and what more soft feet rise and sink.
+STRAY, SINK = 2e-3, 6e-3
 
 
 class BodyFilter:
@@ -136,6 +136,7 @@ class BodyFilter:
         variances[_GYRO] += 2e-5**2 * dt  # drift of the biases after 1 s, rad/s and m/s²
         variances[_FORCE] += 1e-3**2 * dt
         variances[FEET:] += STRAY**2 * dt
+        variances[FEET + 2 :: 3] += SINK**2 * dt
 
     def stand(self, places: Array, noise: Array, free: Flags) -> Flags:
         """Correct everything with where the feet are.

@@ -35,9 +35,8 @@ RECOVERY = 0.3
 # velocities differ by less than this, m/s.
 LOST, ALIKE = 2.0, 0.03
 
-# Time for which a foot must have been slow before it counts as standing: after it has slipped,
-# and after it has landed, as it skids then, s.
-PATIENCE, LANDING = 0.03, 0.012
+# Time for which a foot that has slipped must be slow before it counts as standing, s.
+PATIENCE = 0.015
 
 # Slip velocity of a foot that does not stand, in standard deviations.
 TOO_FAST = 5.0
@@ -348,7 +347,7 @@ class BodyEstimator:
         lands = self._feet.standing & ~before
         self._feet.excluded &= self._feet.standing
         if self._given.rejection:
-            pass
+            self._feet.excluded |= lands  # until they are slow
         return lands
 
     def _judge(self, time: float, moved: Flags, deviations: Array) -> None:

@@ -161,7 +161,6 @@ class Feet:
         self.standing = np.zeros(legs, dtype=bool)
         self.excluded = np.zeros(legs, dtype=bool)  # from the filter, but for their height
         self.slow_since = np.full(legs, math.inf)
-        self.patience = np.zeros(legs)  # s for which they must be slow before they stick
         self.slip = np.zeros((legs, 2))  # smoothed velocity of the contact points, m/s
         self.white = np.ones(legs)  # share of the variance of a sample that is left in it
         self._age = np.zeros(legs)  # of the stance, s

@@ -22,9 +22,6 @@ EVERY = 4
 # Time constant of the share of its stances in which a foot slips, s of stance.
 STANCES = 4.0
 
-# Share of its stances in which a foot slips, above which all feet creep while they seem to stick.
-SLIPPERY = 0.35
-
 # Share below which a foot moves with the others.
 AGREES = 0.5
 
@@ -111,8 +108,6 @@ class Unloaded:
     ----------
     offset : array (legs, 3)
         The error, N, in the axes of the readings; 0 where it is small or not known.
-    found : bool
-        Whether an error was found in the last sample: until then that foot seemed to stand.
     """
 
     def __init__(self, names: tuple[str | int, ...], expected: float) -> None:
@@ -122,7 +117,6 @@ class Unloaded:
         self._next = -math.inf  # time of the next reading, s
         self._much: Flags = np.zeros(len(names), dtype=bool)
         self.offset = np.zeros((len(names), 3))
-        self.found = False
 
     def update(self, time: float, forces: Array, climbing: Array) -> Array:
         """Return readings, (legs, 3), N, without the error, and learn it from them.
@@ -136,7 +130,6 @@ class Unloaded:
         climbing : array (legs,)
             Vertical speeds of the feet over the ground, m/s.
         """
-        self.found = False
         if time >= self._next:
             self._next = time + 0.016
             for leg in np.flatnonzero(np.abs(climbing) > 0.1).tolist():  # m/s: in the air
@@ -155,7 +148,6 @@ class Unloaded:
             return
         self._much[leg] = size > TOO_MUCH * self._expected
         wrong = size > least and not self._much[leg]
-        self.found |= wrong and not self.offset[leg].any()
         self.offset[leg] = offset if wrong else 0.0
 
     def doubt(self) -> str:
@@ -230,34 +222,11 @@ class Legs:
         self.against: Flags = np.zeros(len(robot.legs), dtype=bool)
         self._time = np.zeros(len(robot.legs))  # of stance in motion, s
         self._turn, self._spent = 0, 0.0
-        self._none = 0.0  # share of the time in which feet stand and none of them sticks
-
-    @property
-    def share(self) -> float:
-        """Share of its last stances in which a foot slips, mean of all feet."""
-        return float(self._means[0].sum()) / len(self._names)
-
-    @property
-    def slippery(self) -> float:
-        """Share of slips beyond SLIPPERY, if now and then no foot sticks, else 0."""
-        # Where some foot always sticks, the others may be in the air, with force sensors that read
-        # something there.
-        return max(0.0, self.share - SLIPPERY) if self._none > 0.03 else 0.0
-
-    @property
-    def agree(self) -> bool:
-        """Whether feet stick for most of their stances, so that they show something."""
-        return self.share < 0.45
-
-    @property
-    def sticks(self) -> bool:
-        """Whether every foot sticks for half of its stances or more."""
-        return bool(self._means[0].max() <= AGREES)
 
     def update(
         self, dt: float, standing: Flags, slipping: Flags, slips: Array, moves: Array
-    ) -> bool:
-        """Add a step; return whether other legs than before move against the others.
+    ) -> None:
+        """Add a step.
 
         Parameters
         ----------
@@ -271,7 +240,7 @@ class Legs:
         self._turn += 1
         self._spent += dt
         if self._turn % EVERY:
-            return False
+            return
         dt, self._spent = self._spent, 0.0
         means = self._means
         # Feet that neither move nor slip show nothing.
@@ -279,19 +248,12 @@ class Legs:
         self._time += counts * dt
         gain = counts * dt / np.clip(self._time, max(dt, 1e-9), STANCES)
         means += gain * (np.stack([slipping, slips, moves]) - means)
-        if standing.any():
-            self._none += dt / STANCES * (float(not (standing & ~slipping).any()) - self._none)
         shares = means[0]
-        if not (shares > AGREES).any():
-            self.against = self.against & False
-            return False
-        before = self.against
         # Where all feet slip for half of their stances, some do so nearly always.
         most = 2 * int((shares < AGREES).sum()) >= len(shares)
         wrong = (shares > AGAINST) & (means[1] > FASTER * means[2]) & most
         wrong &= self._time > 0.5 * STANCES
-        self.against = wrong | (before & (shares > AGREES))
-        return bool((self.against & ~before).any())
+        self.against = wrong | (self.against & (shares > AGREES))
 
     def doubt(self) -> str:
         """Return which legs do, or an empty text."""
