@@ -194,17 +194,17 @@ class Soles:
             depth = ground + POINT - height
             sprung = depth if depth > 0.0 else 0.0, sole.pressure
             if sprung != sole.sprung:
-                self._give_way(sole, *sprung)
+                sole.sprung = sprung
+                self._give_way(sole, sprung[0])
 
-    def _give_way(self, sole: Sole, depth: float, pressure: float) -> None:
+    def _give_way(self, sole: Sole, depth: float) -> None:
         """Set spring and damper of a foot at a depth, m, as an implicit step of them needs.
 
         MuJoCo's contact has the force D(-b v - k r - a) at a penetration r, speed v and
         acceleration a. A damper c, and a spring K at the middle of the step h, need
         D = K h²/2 + c h and b = 1/h: stable at all steps, once the foot has touched.
         """
-        sole.sprung = depth, pressure
-        force, stiffness = laws.spring(self.foot, depth, pressure)
+        force, stiffness = laws.spring(self.foot, depth, sole.pressure)
         dt, damper = self._dt, self._loss * force
         mass = 0.5 * stiffness * dt * dt + damper * dt
         share = mass * sole.inverse / (1.0 + mass * sole.inverse)
