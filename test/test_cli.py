@@ -67,7 +67,7 @@ def test_without_a_simulation_options_of_a_walk_are_refused(words, tmp_path, cap
     monkeypatch.chdir(tmp_path)
     shipped = SCENE.with_name('hexapod_dry_distance.yaml').read_text()
     scene = pathlib.Path('strict.yaml')
-    scene.write_text(shipped.replace('accuracy: 0.1 ', 'accuracy: 0.04 '))
+    scene.write_text(shipped.replace('accuracy: 0.1 ', 'accuracy: 0.044 '))
     for policy, level in (('flat', 'L1'), ('dome', 'L2')):
         assert cli.main(['run', str(scene), '--policy', policy, *words]) == 2
         said = capsys.readouterr().err

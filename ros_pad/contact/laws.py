@@ -165,8 +165,8 @@ def drag(foot: Any, film: Any, pressure: float, sphere: float, slip: float, time
     thickness = 0.3215 * sphere * (6.0 * foot.viscosity * slip / tension) ** (2.0 / 3.0)
     thickness, part = min(thickness, film[FRESH]), min(1.0, slip * time / (4.0 * radius))
     share, film[CORE] = dry(foot, thickness), film[CORE] + part * (thickness - film[CORE])
-    for cell in range(min(int(film[AREA] / foot.cell) + 1, CELLS)):
-        film[FILM + cell] += part * (share - film[FILM + cell])
+    for cell in range(FILM, FILM + min(int(film[AREA] / foot.cell) + 1, CELLS)):
+        film[cell] += part * (share - film[cell])
 
 
 def keep_rim(foot: Any, film: Any, sphere: float) -> None:
@@ -219,20 +219,25 @@ def dry_share(foot: Any, film: Any, sphere: float) -> float:
     area, rim = film[AREA], film[RIM]
     if rim <= 0.0:
         return between_areas(foot, film, 0.0, area) / area
-    radius = sqrt(film[EDGE] / pi)
+    edge, slope = film[EDGE], film[CORE] / rim
+    radius, least = sqrt(edge / pi), rim_film(film, sphere, 0.0)
     total = between_areas(foot, film, 0.0, pi * (radius - rim) * (radius - rim))
-    total += between_areas(foot, film, film[EDGE], area)
-    for index in range(len(POINTS)):
-        inwards, weight = POINTS[index] * rim, WEIGHTS[index]
-        share = dry(foot, rim_film(film, sphere, inwards))
-        total += weight * rim * share * 2.0 * pi * (radius - inwards)
+    if edge < area:
+        total += between_areas(foot, film, edge, area)
+    for index in range(4):
+        inwards = POINTS[index] * rim
+        thickness = slope * inwards
+        share = dry(foot, thickness if thickness > least else least)
+        total += WEIGHTS[index] * rim * share * 2.0 * pi * (radius - inwards)
     return total / area
 
 
 def between_areas(foot: Any, film: Any, start: float, end: float) -> float:
     """Return the dry area of cells between two areas, m²."""
     size = foot.cell
-    first, last = int(start / size), min(int(end / size), CELLS)
+    first, last = int(start / size), int(end / size)
+    if last > CELLS:
+        last = CELLS
     if first >= last:
         return film[FILM + first] * (end - start) if first < CELLS else 0.0
     whole = 0.0

@@ -12,6 +12,8 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ros_pad.contact import WATER, hysteresis_force
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.resistance import THICK_FILM
@@ -210,26 +212,45 @@ def _pull(scene: Scene, policy: str) -> Term:
 def _suction(scene: Scene, policy: str) -> Term:
     """Return the pull of the film at lift-off.
 
-    Rigid discs that part at a speed V: F = 3 π η a⁴ V/(2 h³), at most the atmosphere on them. A
-    swing begins with h = k t²/2, so F falls below that after (12 π η a⁴/(k² F))^(1/5). A policy
-    that adapts has flat feet on wet ground, too: until it has found out.
+    A swing begins with a rise of k t²/2 from the film that a stance leaves. A policy that adapts
+    has flat feet on wet ground, too: until it has found out.
     """
     gait = scene.gait
     rise = 2.0 * gait.lift * (math.pi / (gait.cycle - gait.stance)) ** 2
-    most, until = 0.0, 0.0
+    impulse, most = 0.0, 0.0
     for dome in {'flat': (False,), 'dome': (True,)}.get(policy, (False, True)):
-        count, radius = Stand(scene, dome).discs
+        stand = Stand(scene, dome)
+        count, radius = stand.discs
+        film = stand.films(gait.stance)[count == 1]
         force = ATMOSPHERE * count * math.pi * radius**2
-        viscous = 12.0 * math.pi * scene.floor.viscosity * count * radius**4
-        most, until = max((most, until), (force, (viscous / (rise**2 * force)) ** 0.2))
+        time = force * _suction_time(radius, film, rise, scene.floor.viscosity)
+        impulse, most = max((impulse, most), (time, force))
     term = Term(
         'suction of the film at lift-off',
-        1.25 * most * until / (scene.expected_load * gait.stance),
-        f'of the impulse of a load of {_brief(scene.expected_load)} N in its stance: at most'
-        f' {_brief(most)} N, the atmosphere on the contact, for {_brief(1e3 * until)} ms; it loads'
-        ' the feet that stand',
+        impulse / (scene.expected_load * gait.stance),
+        f'of the impulse of a load of {_brief(scene.expected_load)} N in its stance: as much as'
+        f' {_brief(most)} N, a vacuum below the whole contact, for {_brief(1e3 * impulse / most)}'
+        ' ms; it loads the feet that stand',
     )
     return replace(term, effect=_of_one(term, 1.0, scene, policy))
+
+
+def _suction_time(radius: float, film: float, rise: float, viscosity: float) -> float:
+    """Return the impulse of a disc of a radius, m, over the force of a vacuum below it, s.
+
+    It rises from a film, m, by ``rise`` t²/2. Pressure below it is 3 η V (a² - r²)/h³ (Reynolds),
+    and no less than a vacuum: liquid parts to a radius c where that would be less, with x = 1/(1 -
+    u + u ln u), u = c²/a², for the share x of a vacuum that the centre would have; the force is
+    x (1 - u)²/2 of the full one.
+    """
+    parted = 1.0 - np.geomspace(1.0, 1e-6, 200)
+    more = 1.0 / (1.0 - parted + parted * np.log(np.maximum(parted, 1e-9)))
+    time = np.geomspace(1e-6, 1.0, 1000)  # s
+    height = film + 0.5 * rise * time**2
+    share = 3.0 * viscosity * rise * time * radius**2 / (ATMOSPHERE * height**3)
+    broken = np.interp(share, more, 0.5 * more * (1.0 - parted) ** 2)
+    force = np.where(share < 1.0, 0.5 * share, broken)
+    return float(0.5 * (force[1:] + force[:-1]) @ np.diff(time))
 
 
 def _air(scene: Scene) -> Term:
