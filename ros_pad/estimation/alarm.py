@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Slip speed, and its alarm: one-sided CUSUM tests (Page 1954) for slow and for fast slip."""
+"""Slip speed, and its alarm: a one-sided CUSUM test (Page 1954) of the displacement."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ros_pad.configuration import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.tuning import Tuning
 
@@ -24,72 +22,37 @@ BODY_CORRELATION = 0.15
 """Time over which errors of a measured velocity of the contact are the same, s: that of the body,
 which is common to all feet, lasts for about a stance."""
 
-SLOW_SLIP = 0.01
-"""Slip speed for which the test for slow slip is designed, m/s."""
+SLOWEST_SLIP = 0.01
+"""Speed up to which a contact may move without an alarm, m/s: feet roll and bend."""
 
-FAST_SLIP = 0.03
-"""Slip speed for which the test for fast slip is designed, m/s. Each test alone detects slip at
-the speed of the other test late.
-"""
+SURE = 3.0
+"""Standard deviations of a measured velocity, or of a place, that are no slip."""
 
 
 class SlipAlarm:
-    """Raise an alarm when there is enough evidence for slip at one of several speeds.
+    """Raise an alarm when a contact has moved on by a distance.
 
-    The statistic g ← max(0, g + v1/σ² (v - v1/2)) is the log-likelihood ratio of slip at v1 to
-    stick, summed since the time when stick was last more likely than slip.
-
-    Parameters
-    ----------
-    correlation_time : float
-        Correlation time of the noise of the speed, s, from 0: samples closer together have less
-        weight.
-    speeds : sequence of float
-        Slip speeds v1 for which there is a test, m/s, above 0.
-    threshold : float
-        Threshold of the statistics, nats, above 0. With independent noise of any level, at least
-        e^threshold samples lie between false alarms of a test on average (Lorden 1971), mostly
-        far more.
+    The displacement d ← max(0, d + (v - a) dt) counts what is faster than the allowed speed a,
+    from when it last was none.
 
     Attributes
     ----------
-    statistics : list of float
-        The statistics g, nats, from 0 to 1.25 times the threshold.
-
-    Raises
-    ------
-    InvalidInput
-        When a value is outside its range; the message names it.
+    displacement : float
+        The displacement, m, from 0 to 1.25 times the distance, so that the alarm ends soon after
+        the slip.
     """
 
-    def __init__(
-        self,
-        correlation_time: float,
-        speeds: Sequence[float] = (SLOW_SLIP, FAST_SLIP),
-        threshold: float = Tuning.alarm_threshold,
-    ) -> None:
-        self._correlation_time = number('correlation_time', correlation_time, 's')
-        self._threshold = number('threshold', threshold, '(nats)', above=True)
-        self._highest = 1.25 * self._threshold  # so that the alarm ends soon after the slip
-        self._speeds = [number('speed', speed, 'm/s', above=True) for speed in speeds]
-        self.reset()
+    def __init__(self) -> None:
+        self.displacement = 0.0
 
-    def reset(self) -> None:
-        """Discard all evidence; call it at touch-down."""
-        self.statistics = [0.0] * len(self._speeds)
+    def update(self, speed: float, allowed: float, distance: float, dt: float) -> bool:
+        """Process a slip speed, m/s, dt seconds after the last one; return if the alarm is on.
 
-    def update(self, speed: float, noise: float, dt: float) -> bool:
-        """Process a slip speed, m/s, with its deviation, m/s, dt seconds after the last one.
-
-        Return whether the alarm is on.
+        ``allowed`` is the allowed speed, m/s, and ``distance`` that of an alarm, m.
         """
-        variance = noise * noise * max(self._correlation_time / dt, 1.0)
-        raised = False
-        for test, designed in enumerate(self._speeds):
-            statistic = self.statistics[test] + designed / variance * (speed - 0.5 * designed)
-            raised |= statistic > self._threshold
-            self.statistics[test] = min(max(0.0, statistic), self._highest)
-        return raised
+        moved = max(0.0, self.displacement + (speed - allowed) * dt)
+        self.displacement = min(moved, 1.25 * distance)
+        return moved > distance
 
 
 class Slip:
@@ -111,8 +74,7 @@ class Slip:
         self._joints = tuning.source == 'joints'
         self._shear = 1.0 / foot.shear_stiffness
         self.softness = self._shear if tuning.pads_shear or not self._joints else 0.0
-        memory = BODY_CORRELATION if self._joints else SMOOTHING
-        self.alarm = SlipAlarm(memory, threshold=tuning.alarm_threshold)
+        self.alarm, self._distance = SlipAlarm(), tuning.alarm_distance
         # Smoothed position of the contact, m; with joints smoothed shear of the pads.
         self._x = self._y = self.noise = self.contact_noise = self.sd = 0.0
 
@@ -126,7 +88,7 @@ class Slip:
         x, y = sample.x + fx * self._shear, sample.y + fy * self._shear
         sheared = fx * self.softness, fy * self.softness
         self._x, self._y = sheared if self._joints else (x, y)
-        self.alarm.reset()
+        self.alarm.displacement = 0.0
         return x, y
 
     def update(
@@ -155,4 +117,7 @@ class Slip:
         pull = math.sqrt(fx * fx + fy * fy)
         # A foot gives way against its tangential force; the rest of its speed is only noise.
         speed = -along / pull if pull > 0.0 else 0.0
-        return speed, self.alarm.update(speed, self.sd, dt), (x, y)
+        # Errors of a velocity last, those of a place do not.
+        allowed = max(SLOWEST_SLIP, SURE * self.sd if self._joints else 0.0)
+        distance = max(self._distance, SURE * self.contact_noise)
+        return speed, self.alarm.update(speed, allowed, distance, dt), (x, y)

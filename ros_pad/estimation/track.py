@@ -330,7 +330,7 @@ class Track:
         self._window = Window(time)
         self._stand(time, sample, force, pressure)
         self._window = Window(time, True, peak)
-        self.slip.alarm.reset()
+        self.slip.alarm.displacement = 0.0
         assert self.last
         self.last = self.last._replace(slip_speed=0.0, turning=0.0, slipping=False)
         self.fresh |= not stood or self.ground.doubt.code != doubt.MOTION

@@ -62,9 +62,9 @@ class Tuning:
         4.0, 'Root mean square of the rate at which a standing foot turns about the vertical; for'
         ' legs without an ankle, the speed of the body over the length of the leg.',
         'rad/s', 0.0, 100.0)
-    alarm_threshold: float = _field(
-        4.0, 'Threshold of the slip alarm: on average at least exp(threshold) samples lie between'
-        ' false alarms.', 'nats', 0.1, 100.0)
+    alarm_distance: float = _field(
+        5e-4, 'Distance by which a contact has slipped when the alarm is raised.',
+        'm', 1e-5, 0.1)
     source: str = _field(
         'markers', 'Where slip comes from: positions of markers, or velocities of contact points'
         ' with their variances, which a body estimator has from joints and IMU.', choices=SOURCES)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import dpotrf, dtrtri, dtrtrs
 
-from ros_pad.robots.rotation import Array, cross, rotation, skew
+from ros_pad.robots.rotation import Array, rotation, skew
 
 Flags = npt.NDArray[np.bool_]
 
@@ -76,8 +76,8 @@ class BodyFilter:
         self.footholds = np.zeros((legs, 3))
         self.covariance = np.zeros((size, size))
         self._noise, self._gate = np.array(3 * [gyro_noise] + 3 * [accelerometer_noise]), gate
-        # What errors, and errors of gyro and accelerometer, do in a step.
-        self._step = np.eye(size), np.zeros((size, 6))
+        # What errors, and errors of gyro and accelerometer, do in a step of a length, s.
+        self._step, self._inputs, self._dt = np.eye(size), np.zeros((size, 6)), 0.0
 
     def spread(self, turn: float, velocity: float, gyro_bias: float, force_bias: float) -> None:
         """Set standard deviations in SI units, without correlations; of ``turn``, only tilt."""
@@ -118,18 +118,18 @@ class BodyFilter:
 
     def _spread_on(self, dt: float, turn: Array) -> None:
         """Advance the covariance."""
-        turned = -dt * turn
-        step, inputs = self._step
-        inputs[_TURN, :3] = turned
-        inputs[_SPEED, :3] = skew(self.velocity) @ turned
-        inputs[_SPEED, 3:] = turned
-        inputs[FEET:, :3] = (skew(self.footholds) @ turned).reshape(-1, 3)
-        step[:, 9:15] = inputs
-        step[_GYRO, _GYRO] = step[_FORCE, _FORCE] = _UNIT
-        step[_SPEED, _TURN] = dt * _FALL
-        step[_PLACE, _TURN] = -dt * skew(self.velocity)
-        step[_PLACE, _SPEED] = dt * _UNIT
-        step[FEET:].reshape(-1, 3, step.shape[1])[..., _SPEED] = -dt * _UNIT
+        step, inputs = self._step, self._inputs
+        if dt != self._dt:
+            self._dt = dt
+            step[_SPEED, _TURN] = dt * _FALL
+            step[_PLACE, _SPEED] = dt * _UNIT
+            step[FEET:].reshape(-1, 3, step.shape[1])[..., _SPEED] = -dt * _UNIT
+        inputs[_TURN, :3] = inputs[_SPEED, 3:] = turned = -dt * turn
+        lines = skew(np.concatenate([self.velocity[None], self.footholds]))
+        inputs[_SPEED, :3] = lines[0] @ turned
+        inputs[FEET:, :3] = (lines[1:] @ turned).reshape(-1, 3)
+        step[_PLACE, _TURN] = -dt * lines[0]
+        step[:9, 9:15], step[FEET:, 9:15] = inputs[:9], inputs[FEET:]
         noise = self._noise * inputs
         self.covariance[:] = step @ self.covariance @ step.T + noise @ noise.T
         variances = _diagonal(self.covariance)
@@ -221,11 +221,12 @@ class BodyFilter:
     def apply(self, error: Array) -> None:
         """Correct the state by an estimated error, (15 + 3 legs,)."""
         turn = error[_TURN]
-        self.velocity = self.velocity + error[_SPEED] + cross(turn, self.velocity)
+        axes = skew(turn)
+        self.velocity = self.velocity + error[_SPEED] + axes @ self.velocity
         self.position = self.position + error[_PLACE]
         self.gyro_bias = self.gyro_bias + error[_GYRO]
         self.force_bias = self.force_bias + error[_FORCE]
-        self.footholds += error[FEET:].reshape(-1, 3) + cross(turn, self.footholds)
+        self.footholds += error[FEET:].reshape(-1, 3) - self.footholds @ axes
         self.turn = rotation(turn) @ self.turn
 
 

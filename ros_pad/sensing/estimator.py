@@ -204,7 +204,8 @@ class BodyEstimator:
             self._doubts.add(time, contradiction)
             if contradiction.startswith('imu'):
                 self._filter.lose(BLIND_TURN)
-        return self._process(sample, self._advance(sample))
+        rolling = self._rolling(sample)
+        return self._process(sample, self._advance(sample, rolling), rolling)
 
     @property
     def delay(self) -> tuple[float, float]:
@@ -262,7 +263,7 @@ class BodyEstimator:
         if not calm and time >= self._doubts.until:
             self._doubts.add(time, 'start: the robot may be moving')
 
-    def _advance(self, sample: Sample) -> float:
+    def _advance(self, sample: Sample, rolling: Array) -> float:
         """Advance the filter to the time of the readings; return the step, s, 0 after a gap."""
         time, gyro, accelerometer = sample[:3]
         dt, before, self._time = time - self._time, self._step, time
@@ -280,8 +281,8 @@ class BodyEstimator:
             self._feet.standing[:] = False  # their footholds are made anew
         # What happened in a gap is unknown: the body is taken to have stood.
         step = dt if dt <= LONGEST_GAP else 0.0
-        rolling = np.where(self._feet.standing[:, None], self._rolling(sample), 0.0)
-        self._filter.predict(step, gyro, accelerometer, rolling)
+        rolls = rolling * self._feet.standing[:, None]
+        self._filter.predict(step, gyro, accelerometer, rolls)
         # One reading after a gap says nothing about the time without readings.
         self._pull += (math.sqrt(accelerometer @ accelerometer) - self._pull) * step
         return step
@@ -292,7 +293,7 @@ class BodyEstimator:
         turning = (turning + sample.gyro - self._filter.gyro_bias) @ self._filter.turn.T
         return self._robot.foot_radius * (turning @ _ROLLS)
 
-    def _process(self, sample: Sample, dt: float) -> BodyEstimate:
+    def _process(self, sample: Sample, dt: float, rolling: Array) -> BodyEstimate:
         """Correct the filter with the feet, and return the estimate."""
         time, gyro, _, kinematics, dq, forces = sample
         body, feet = self._filter, self._feet
@@ -308,24 +309,24 @@ class BodyEstimator:
             self._reset()
             self._begin(sample)
             self._doubts.add(time, 'diverged: odom begins anew')
-            self._advance(sample)
-            return self._process(sample, 0.0)
+            self._advance(sample, rolling)
+            return self._process(sample, 0.0, rolling)
         self._rest(sample)
         turn = body.turn
         rate = gyro - body.gyro_bias
         moving = (kinematics.jacobians @ dq[..., None])[..., 0]
-        moving = (moving + kinematics.positions @ skew(rate).T) @ turn.T
+        moving = (moving - kinematics.positions @ skew(rate)) @ turn.T
         velocities = body.velocity + moving
         feet.climbing = velocities[:, 2]
-        slips = velocities - self._rolling(sample)
+        slips = velocities - rolling
         feet.smooth(dt, slips[:, :2], lands)
         variance = body.covariance
         common = 0.5 * (variance[3, 3] + variance[4, 4])
         lever = 0.5 * (squares[:, 0, 0] + squares[:, 1, 1])
         deviations = np.sqrt(feet.white * self._given.velocity_noise**2 * lever + common)
-        self._judge(time, moved[:, 0], deviations)
-        places = kinematics.positions @ turn.T
         speeds = np.hypot(feet.slip[:, 0], feet.slip[:, 1])
+        self._judge(time, moved[:, 0], speeds / deviations)
+        places = kinematics.positions @ turn.T
         sticking = feet.standing & (speeds < 0.05)  # m/s
         self._checks.delay.update(time, turn @ rate, places, slips, sticking)
         self._checks.legs.update(
@@ -350,14 +351,13 @@ class BodyEstimator:
             self._feet.excluded |= lands  # until they are slow
         return lands
 
-    def _judge(self, time: float, moved: Flags, deviations: Array) -> None:
-        """Update which feet are excluded, from those that have moved and deviations of slip."""
+    def _judge(self, time: float, moved: Flags, speeds: Array) -> None:
+        """Update which feet are excluded; ``speeds`` of slip are in standard deviations."""
         if not self._given.rejection:
             return
         feet = self._feet
-        speeds = np.hypot(feet.slip[:, 0], feet.slip[:, 1])
-        fresh = feet.standing & ~feet.excluded & (moved | (speeds > TOO_FAST * deviations))
-        slow = feet.standing & ~fresh & (speeds < 2.5 * deviations)
+        fresh = feet.standing & ~feet.excluded & (moved | (speeds > TOO_FAST))
+        slow = feet.standing & ~fresh & (speeds < 2.5)
         feet.slow_since = np.where(slow, np.minimum(feet.slow_since, time), math.inf)
         feet.excluded |= fresh
         feet.excluded &= ~(time - feet.slow_since >= PATIENCE)
@@ -414,8 +414,8 @@ class BodyEstimator:
         centres = places + body.position
         loads = np.zeros_like(places) if forces is None else forces @ turn.T
         state = self._feet
-        flags = state.standing.tolist(), state.slip.copy(), deviations.tolist(), state.excluded.tolist()
-        feet = tuple(map(FootMotion, centres, velocities, loads, *flags))
+        flags = state.standing.tolist(), state.slip.copy(), deviations.tolist()
+        feet = tuple(map(FootMotion, centres, velocities, loads, *flags, state.excluded.tolist()))
         velocity = body.velocity + turn @ cross(rate, self._body.to_imu[:3, 3])
         # From the filter's errors to those of the base: rotation moves it about the IMU.
         step = self._body.errors

@@ -16,7 +16,6 @@ from ros_pad.robots import Kinematics
 from ros_pad.robots.rotation import Array
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
 
-
 SMOOTHING = 0.01
 """Time constant of the slip velocity, s: as sluggish as a mean over twice that."""
 

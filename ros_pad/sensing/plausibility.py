@@ -135,7 +135,7 @@ class Unloaded:
             for leg in np.flatnonzero(np.abs(climbing) > 0.1).tolist():  # m/s: in the air
                 self._rows[leg, self._count[leg] % READINGS] = forces[leg]
                 self._count[leg] += 1
-                if self._count[leg] >= READINGS:
+                if not self._count[leg] % READINGS:
                     self._learn(leg)
         return forces - self.offset
 

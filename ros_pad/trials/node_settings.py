@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -45,10 +44,6 @@ KNOWN = {
 }  # fmt: skip
 """Parameters of estimator and controller that a replay can change, by name."""
 
-SHAKING = 0.3
-"""Error of an acceleration as the mean of a sample while the robot walks, m/s²: its steps are
-shorter. Where all feet slip, the body estimator must not rely on the IMU more than that."""
-
 Value: TypeAlias = 'float | int | bool | str'
 
 
@@ -73,7 +68,7 @@ def body_settings_for(scene: Scene) -> dict[str, Any]:
     return {each.name: each.default for each in BODY_SETTINGS} | {
         'contact_share': share,
         'gyro_noise': sensors.gyro,
-        'accelerometer_noise': math.hypot(sensors.accelerometer, SHAKING),
+        'accelerometer_noise': sensors.accelerometer,
         'accelerometer_bias': sensors.accelerometer_bias,
         'encoder_noise': sensors.encoder,
         'velocity_noise': sensors.joint_velocity,
