@@ -17,7 +17,7 @@ from studies.samples import Flags
 from studies.sensing import rivals
 from studies.sensing.walks import Course, Log
 
-METHODS = ('estimator', 'no rejection', 'invariant', 'invariant, χ²', 'odometry')
+METHODS = ('estimator', 'no rejection', 'plain', 'invariant, χ²', 'odometry')
 
 
 class Track(NamedTuple):
@@ -83,8 +83,7 @@ def track_of(robot: Robot, log: Log, course: Course, method: str) -> Track:
     if method == 'estimator':
         return estimated(robot, log, course)
     if method == 'no rejection':
-        # Slips would look like feet and legs of another size.
-        return estimated(robot, log, course, rejection=False, sizes=False)
+        return estimated(robot, log, course, rejection=False)
     begin = time.process_time()
     if method in rivals.FILTERS:
         rows = rivals.FILTERS[method](robot, course).rows(log)

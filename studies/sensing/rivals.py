@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rivals of the body estimator: an invariant filter, and legged odometry."""
+"""Rivals of the body estimator: a plain filter, an invariant one, and legged odometry."""
 
 from __future__ import annotations
 
@@ -201,7 +201,128 @@ class InvariantFilter:
         return rows
 
 
-FILTERS: dict[str, Callable[[Robot, Course], InvariantFilter]] = {
-    'invariant': InvariantFilter,
+class PlainFilter:
+    """Error-state filter of a practitioner (Bloesch 2012), with places of feet in odom.
+
+    State: rotation, velocity, position, biases of gyro and accelerometer, feet. Feet are taken in
+    the order of their consistency. One whose squared innovation is above 99 % of χ², or that has
+    landed, keeps its height alone until its contact was slow for 30 ms.
+    """
+
+    stray, kinematics, patience = 1e-3, 5e-4, 0.03  # m after 1 s, m, s
+
+    def __init__(self, robot: Robot, course: Course) -> None:
+        self._robot, self._dt, self._noise = robot, 1.0 / course.rate, course.noise
+        self._to_imu: Array = np.asarray(np.linalg.inv(robot.imu), dtype=float)
+        legs = len(robot.legs)
+        self._turn = np.eye(3)
+        self._state = np.zeros((4 + legs, 3))  # position, velocity, two biases, feet
+        deviations = [0.01, 0.01, 0.0, *[0.02] * 3, *[0.0] * 3, *[GYRO_BIAS] * 3]
+        deviations += [course.noise.accelerometer_bias] * 3 + [0.0] * 3 * legs
+        self._covariance = np.diag(np.square(deviations))
+        self._stands = self._loose = np.zeros(legs, dtype=bool)
+        self._slow = np.zeros(legs)  # s
+
+    def _lines(self, leg: int, arm: Array) -> Array:
+        """Return what errors do to the place of a foot against where it stood, (3, size)."""
+        lines = np.zeros((3, len(self._covariance)))
+        lines[:, 0:3], lines[:, 6:9] = -skew(arm), np.eye(3)
+        lines[:, 15 + 3 * leg : 18 + 3 * leg] = -np.eye(3)
+        return lines
+
+    def _set_down(self, leg: int, arm: Array, noise: Array, cells: int) -> None:
+        """Make a new place for a foot, or only in the plane."""
+        at = slice(15 + 3 * leg, 15 + 3 * leg + cells)
+        lines = self._lines(leg, arm)[:cells]
+        lines[:, 15:] = 0.0
+        row = lines @ self._covariance
+        self._state[4 + leg, :cells] = (self._state[0] + arm)[:cells]
+        self._covariance[at], self._covariance[:, at] = row, row.T
+        self._covariance[at, at] = lines @ self._covariance @ lines.T + noise[:cells, :cells]
+
+    def _predict(self, rate: Array, force: Array, rolling: Array) -> None:
+        dt, turn = self._dt, self._turn
+        step = np.eye(len(self._covariance))
+        step[3:6, 0:3], step[6:9, 3:6] = -dt * skew(turn @ force), dt * np.eye(3)
+        step[0:3, 9:12] = step[3:6, 12:15] = -dt * turn
+        self._turn = turn @ rotation(rate * dt)
+        acceleration = 0.5 * (turn + self._turn) @ force + GRAVITY
+        self._state[0] += dt * (self._state[1] + 0.5 * dt * acceleration)
+        self._state[1] += dt * acceleration
+        self._state[4:] += dt * rolling * self._stands[:, None]
+        noise = np.repeat((self._noise.gyro, self._noise.accelerometer), 3) * dt
+        self._covariance = step @ self._covariance @ step.T
+        variances = self._covariance.ravel()[:: len(step) + 1]
+        variances[:6] += noise**2
+        variances[9:12] += 2e-5**2 * dt
+        variances[12:15] += 1e-3**2 * dt
+        variances[15:] += self.stray**2 * dt
+
+    def _correct(self, leg: int, miss: Array, lines: Array, spread: Array) -> None:
+        gain = np.linalg.solve(spread, lines @ self._covariance).T
+        error = -gain @ miss
+        spread = self._covariance - gain @ spread @ gain.T
+        self._covariance = 0.5 * (spread + spread.T)
+        self._turn = rotation(error[:3]) @ self._turn
+        rows = error[3:].reshape(-1, 3)
+        self._state += np.concatenate([rows[1:2], rows[:1], rows[2:]])
+
+    def _stand(self, places: Array, noise: Array) -> None:
+        """Correct with one foot after the other, the most consistent first."""
+        left = np.flatnonzero(self._stands).tolist()
+        while left:
+            found = []
+            for leg in left:
+                arm, cells = self._turn @ places[leg], slice(2 if self._loose[leg] else 0, 3)
+                miss = (self._state[0] + arm - self._state[4 + leg])[cells]
+                lines = self._lines(leg, arm)[cells]
+                spread = lines @ self._covariance @ lines.T + noise[leg][cells, cells]
+                found.append((miss @ np.linalg.solve(spread, miss), leg, miss, lines, spread))
+            distance, leg, *rest = min(found, key=lambda each: each[0])
+            if distance <= GATE:
+                self._correct(leg, *rest)
+            elif not self._loose[leg]:
+                self._loose[leg], self._slow[leg] = True, 0.0
+                continue  # its height may still be right
+            left.remove(leg)
+
+    def rows(self, log: Log) -> Rows:
+        """Return position, velocity and its deviation, of the base, and the slips."""
+        axis = log.accelerometer[: round(1.0 / self._dt)].mean(0)
+        self._turn = rotation(cross(axis / np.linalg.norm(axis), np.array((0.0, 0.0, 1.0))))
+        self._state[2] = log.gyro[: round(1.0 / self._dt)].mean(0)
+        arm, rows, radius = self._to_imu[:3, 3], [], self._robot.foot_radius
+        for gyro, force, q, dq, stands in zip(
+            *(log.gyro, log.accelerometer, log.joint_positions, log.joint_velocities),
+            loads_of(self._robot, log),
+            strict=True,
+        ):
+            feet, rate = _Feet(self._robot, self._to_imu, q, dq), gyro - self._state[2]
+            rolling = feet.slips(self._turn, rate, 0.0) - feet.slips(self._turn, rate, radius)
+            self._predict(rate, force - self._state[3], rolling)
+            levers = self._turn @ feet.jacobians
+            noise = self._noise.encoder**2 * levers @ levers.transpose(0, 2, 1)
+            noise += self.kinematics**2 * np.eye(3)
+            lands = stands & ~self._stands
+            self._loose = (self._loose | lands) & stands
+            self._slow[lands], self._stands = 0.0, stands
+            for leg in np.flatnonzero(self._loose).tolist():
+                place = self._turn @ feet.places[leg]
+                self._set_down(leg, place, noise[leg], 3 if lands[leg] else 2)
+            self._stand(feet.places, noise)
+            slips = self._state[1] + feet.slips(self._turn, rate, radius)
+            variances = self._covariance.diagonal()[3:5]
+            white = 0.5 * self._noise.velocity**2 * (levers[:, :2] ** 2).sum((1, 2))
+            slow = np.hypot(*slips.T[:2]) < 2.5 * np.sqrt(variances.mean() + white)
+            self._slow = np.where(slow, self._slow + self._dt, 0.0)
+            self._loose = self._loose & (self._slow < self.patience)
+            velocity = self._state[1] + self._turn @ cross(rate, arm)
+            place = self._state[0] + self._turn @ arm
+            rows.append((place, velocity, slips, np.sqrt(variances)))
+        return rows
+
+
+FILTERS: dict[str, Callable[[Robot, Course], InvariantFilter | PlainFilter]] = {
+    'plain': PlainFilter,
     'invariant, χ²': functools.partial(InvariantFilter, gate=GATE),
 }

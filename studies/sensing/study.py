@@ -3,9 +3,8 @@
 
 Beside the estimator: the same without rejection of slipping feet, an invariant filter with and
 without rejection, and legged odometry (gyro, and the mean velocity of the feet that stand). Errors
-are vectors of x and y. Slips are of settled stances, 24 ms after touch-down, faster than 10 mm/s;
-the alarm is that of ros_pad.estimation with a noise of 15 mm/s. A false alarm has no speed above
-5 mm/s in its last 60 ms. With --all, walks that are harder: long pushes, a cheap IMU; and where
+are vectors of x and y. Slips and false alarms are those of studies/slips.py, the alarm that of
+ros_pad.estimation. With --all, walks that are harder: long pushes, a cheap IMU; and where
 methods diverge: all feet slip, no foot stands, feet slide for long, low rates. With --picture,
 sensing.json and sensing.png: time an update against errors; and of --all, sensing_stability.json
 and .png.
@@ -13,27 +12,28 @@ and .png.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.robots import Robot
+from ros_pad.estimation.alarm import SLOWEST_SLIP, SURE, SlipAlarm
+from ros_pad.estimation.tuning import Tuning
 from ros_pad.robots.rotation import Array
-from studies import command
+from ros_pad.sensing.motion import Feet
+from studies import command, slips
 from studies.samples import Flags, runs
 from studies.sensing import chart, stability
 from studies.sensing.methods import METHODS, Track, track_of
-from studies.sensing.walks import COURSES, RAMP, REST, Log, walk
+from studies.sensing.walks import COURSES, RAMP, REST, Log, robot_of, walk
 
 CASES = ('dry', 'patches', 'ice', 'hexapod')
 FIRST_SEED = 111  # constants of the estimator were chosen on seeds below 102
 
-ALARM_NOISE = 0.015  # m/s
-SLIPS, STICKS = 0.01, 0.005  # m/s
-SETTLED, RECENT, WINDOW = 0.024, 0.06, 0.02  # s
+UNKNOWN = 5e-3  # m/s, deviation of the slip of a method that has none
+STICKS = 0.005  # m/s
+SETTLED = 0.024  # s
+LOADED = 0.1  # of the expected load
 
 
 Row = dict[str, Any]
@@ -45,14 +45,14 @@ def alarms_of(track: Track, rate: float) -> Flags:
     tangential = track.force[..., :2]
     strength = np.maximum(np.linalg.norm(tangential, axis=2), 1e-9)
     speeds = -(track.slip * tangential).sum(2) / strength
+    allowed = np.maximum(SLOWEST_SLIP, SURE * np.nan_to_num(track.slip_deviation, nan=UNKNOWN))
     found = np.zeros(speeds.shape, dtype=bool)
     for leg in range(speeds.shape[1]):
-        alarm = SlipAlarm(WINDOW)
         for start, stop in runs(track.standing[:, leg]):
-            alarm.reset()
-            for row in range(start + round(SETTLED * rate), stop):
-                sample = float(speeds[row, leg]), ALARM_NOISE, 1.0 / rate
-                found[row, leg] = alarm.update(*sample)
+            alarm = SlipAlarm()
+            for row in range(start, stop):
+                sample = float(speeds[row, leg]), float(allowed[row, leg])
+                found[row, leg] = alarm.update(*sample, Tuning.alarm_distance, 1.0 / rate)
     return found
 
 
@@ -65,50 +65,14 @@ def settled(standing: Flags, rate: float) -> Flags:
     return found
 
 
-def judge_alarms(track: Track, log: Log, walking: Flags, rate: float) -> dict[str, Any]:
-    """Return missed slips by size and number of feet, false alarms, latency."""
-    recently = round(RECENT * rate)
-    speed = np.linalg.norm(log.slip, axis=2)
-    within = settled(track.standing, rate) & walking[:, None]
-    slips = within & (speed > SLIPS)
-    on = alarms_of(track, rate)
-    all_slip = (slips | ~within).all(1) & within.any(1)
-    missed = {f'{kind} > {size} mm': [0, 0] for kind in ('some', 'all') for size in (5, 10)}
-    late: list[tuple[float, float]] = []
-    false = 0
-    for leg in range(speed.shape[1]):
-        for start, stop in runs(slips[:, leg], join=2):
-            path = speed[start:stop, leg].sum() / rate
-            found = np.flatnonzero(on[start : stop + recently, leg])
-            kind = 'all' if all_slip[start:stop].any() else 'some'
-            for size in (5, 10):
-                if path > 1e-3 * size:
-                    missed[f'{kind} > {size} mm'][0] += not found.size
-                    missed[f'{kind} > {size} mm'][1] += 1
-            fresh = within[start - recently : start, leg].all()
-            if fresh and found.size and path > 5e-3 and not on[start - 1, leg]:
-                late.append((found[0] / rate, speed[start : start + found[0], leg].sum() / rate))
-        for start, _ in runs(on[:, leg] & walking):
-            recent = speed[max(0, start - recently) : start + 1, leg]
-            stood = track.standing[max(0, start - recently) : start + 1, leg]
-            false += not (recent[stood] > STICKS).any()
-    minutes = (within & (speed < STICKS)).sum() / rate / 60.0
-    latency, slipped = np.median(late, axis=0) if late else (math.nan, math.nan)
-    return {
-        'missed': {key: (count[0], count[1]) for key, count in missed.items()},
-        'false_alarms': false / minutes,
-        'latency': float(latency),
-        'slipped': float(slipped),
-    }
-
-
-def mean_slip(log: Log, rate: float) -> Array:
-    """Return the true slip velocities over the last 20 ms, by the trapezoid rule."""
-    window = round(WINDOW * rate)
-    total = np.concatenate([np.zeros((1, *log.slip.shape[1:])), np.cumsum(log.slip, axis=0)])
+def smoothed(log: Log, standing: Flags, rate: float) -> Array:
+    """Return the true slip velocities, as smooth as the estimator's."""
+    feet = Feet(standing.shape[1])
+    lands = standing & ~np.concatenate([standing[:1], standing[:-1]])
     found = np.zeros_like(log.slip)
-    inner = total[window + 1 :] - total[: -window - 1]
-    found[window:] = (inner - 0.5 * (log.slip[window:] + log.slip[:-window])) / window
+    for row, (slip, new) in enumerate(zip(log.slip, lands, strict=True)):
+        feet.smooth(1.0 / rate, slip, new)
+        found[row] = feet.slip
     return found
 
 
@@ -119,7 +83,8 @@ def measure(name: str, seed: int, duration: float) -> list[Row]:
     log = walk(course, seed, duration)
     walking = log.time > REST + RAMP
     path = float(np.linalg.norm(np.diff(log.position[:, :2], axis=0), axis=1).sum())
-    true_slip = mean_slip(log, rate)
+    loaded = log.load > LOADED * robot.mass * 9.81 / (0.5 * len(robot.legs))
+    place = np.cumsum(log.slip, axis=0) / rate
     rows = []
     for method in METHODS:
         track = track_of(robot, log, course, method)
@@ -129,7 +94,7 @@ def measure(name: str, seed: int, duration: float) -> list[Row]:
         moved = (log.position - log.position[0])[-1] - (track.position - track.position[0])[-1]
         within = settled(track.standing, rate) & walking[:, None]
         sticks = within & (np.linalg.norm(log.slip, axis=2) < STICKS)
-        slip = track.slip - true_slip
+        slip = track.slip - smoothed(log, track.standing, rate)
         inside = np.abs(slip) < 2.0 * track.slip_deviation[..., None]
         rows.append(
             {'course': name, 'seed': seed, 'method': method, 'path': path}
@@ -145,17 +110,17 @@ def measure(name: str, seed: int, duration: float) -> list[Row]:
                 'doubt': float(track.doubt[walking].mean()),
                 'seconds': track.seconds,
             }
-            | judge_alarms(track, log, walking, rate)
+            | {
+                'alarms': slips.judged(
+                    alarms_of(track, rate), loaded, place, 1.0 / rate, REST + RAMP
+                )
+            }
         )
     return rows
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """Return error of velocity x y, mm/s, and drift, %, of every method; and of the estimator.
-
-    Missed slips are those above 5 and above 10 mm, first where some feet stick, then where all
-    slip.
-    """
+    """Return error of velocity x y, mm/s, and drift, %, of every method; and its detection."""
     lines = ['| walk | ' + ' | '.join(METHODS) + ' |', '|---' * (len(METHODS) + 1) + '|']
     for name in dict.fromkeys(row['course'] for row in rows):
         cells = [name]
@@ -164,16 +129,22 @@ def summary(rows: Sequence[Row]) -> str:
             error, drift = np.mean([(row['velocity_error'], row['drift']) for row in some], axis=0)
             cells.append(f'{1e3 * error:.1f}; {1e2 * drift:.2f}')
         lines.append('| ' + ' | '.join(cells) + ' |')
-    for name in dict.fromkeys(row['course'] for row in rows):
-        own = [row for row in rows if (row['course'], row['method']) == (name, METHODS[0])]
-        missed = {k: np.sum([row['missed'][k] for row in own], axis=0) for k in own[0]['missed']}
-        mean = {k: np.mean([row[k] for row in own]) for k in ('coverage', 'false_alarms')}
-        lines.append(
-            f'{name}: in 2 sd {mean["coverage"]:.2f}, false alarms a minute'
-            f' {mean["false_alarms"]:.1f}, missed '
-            + ', '.join(f'{key}: {hits} of {count}' for key, (hits, count) in missed.items())
-        )
-    return '\n'.join(lines)
+    return '\n'.join([*lines, '', command.listed(detection(rows))])
+
+
+def detection(rows: Sequence[Row]) -> list[Row]:
+    """Return what the alarm does with every method on each walk."""
+    kinds = dict.fromkeys((row['course'], row['method']) for row in rows)
+    return [
+        {'course': kind[0], 'method': kind[1]}
+        | slips.row_of([row['alarms'] for row in rows if (row['course'], row['method']) == kind])
+        for kind in kinds
+    ]
+
+
+def plain(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows without counts of alarms."""
+    return [{key: value for key, value in row.items() if key != 'alarms'} for row in rows]
 
 
 def main(words: Sequence[str]) -> int:
@@ -196,12 +167,13 @@ def main(words: Sequence[str]) -> int:
     shown = summary(rows)
     if options.picture:
         picture = chart.picture(rows, METHODS)
-        command.write(options.out, 'sensing', {'rows': rows}, {'sensing': picture})
+        document = {'rows': plain(rows), 'detection': detection(rows)}
+        command.write(options.out, 'sensing', document, {'sensing': picture})
     if options.all:
         found = stability.measure(seeds)
         shown += f'\n\n{stability.summary(found)}'
         name, document = 'sensing_stability', {'curves': [vars(each) for each in found]}
         if options.picture:
             command.write(options.out, name, document, {name: chart.stability(found)})
-    command.show(options, rows, shown)
+    command.show(options, plain(rows), shown)
     return 0

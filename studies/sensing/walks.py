@@ -298,7 +298,7 @@ def walk(course: Course, seed: int, duration: float) -> Log:
             mujoco.mj_step(model, data)
         mujoco.mj_forward(model, data)  # all readings are of this moment
         _read(mujoco, model, data, feet, rows)
-        # Accelerometers average. MuJoCo's own is of an explicit step, the motion of an implicit one.
+        # Accelerometers average. MuJoCo's own is of an explicit step, not of this implicit one.
         speed, last = _imu_velocity(robot, data), speed
         acceleration = (speed - last) * course.rate
         rows['accelerometer'].append(_specific_force(robot, model, rows, acceleration))

@@ -71,7 +71,7 @@ def test_a_robot_at_rest_stays_where_it_is_and_learns_the_bias_of_its_gyro():
     found = [motion.step() for _ in range(1000)]
     last = found[-1]
     assert last.position == pytest.approx(np.zeros(3), abs=2e-3)
-    assert np.mean([foot.left_out for each in found[50:] for foot in each.feet]) < 0.005
+    assert np.mean([foot.excluded for each in found[50:] for foot in each.feet]) < 0.005
     assert all(foot.in_contact for foot in last.feet)
     assert {each.doubt for each in found} == {''}
     # Without the bias it would turn by 0.015 rad/s x 4 s = 60 mrad.
@@ -92,7 +92,7 @@ def test_velocity_and_path_of_a_body_over_feet_that_stick(noise):
     assert found.position == pytest.approx(motion.place, abs=3e-3)
     for foot in found.feet:
         assert np.linalg.norm(foot.slip_velocity) < 5.0 * foot.slip_velocity_sd
-        assert not foot.left_out
+        assert not foot.excluded
     assert found.covariance == pytest.approx(found.covariance.T, abs=1e-12)
     assert np.linalg.eigvalsh(found.covariance).min() > -1e-12
 
@@ -108,10 +108,10 @@ def test_slips_are_found_and_do_not_drag_the_body_along(feet):
     for leg, foot in enumerate(found[-1].feet):
         expected = [0.0, 0.1 if leg in feet else 0.0]
         assert foot.slip_velocity == pytest.approx(expected, abs=0.025)
-        assert foot.left_out == (leg in feet)
+        assert foot.excluded == (leg in feet)
     assert max(np.abs(each.velocity).max() for each in found) < 0.012
     after = [motion.step() for _ in range(50)]
-    assert not any(foot.left_out for foot in after[-1].feet)
+    assert not any(foot.excluded for foot in after[-1].feet)
 
 
 def test_when_all_feet_slip_the_imu_tells_and_there_is_a_doubt():
@@ -120,7 +120,7 @@ def test_when_all_feet_slip_the_imu_tells_and_there_is_a_doubt():
         motion.step()
     slips = np.tile((0.1, 0.0, 0.0), (4, 1))
     found = [motion.step((0.0, 0.0, 0.0), slips) for _ in range(110)]
-    assert all(foot.left_out for foot in found[30].feet)
+    assert all(foot.excluded for foot in found[30].feet)
     assert found[60].velocity == pytest.approx(np.zeros(3), abs=0.02)
     assert found[-1].doubt.startswith('slipping: ')
     assert found[30].doubt == ''
@@ -166,7 +166,7 @@ def test_a_lifted_body_is_in_doubt_and_its_deviation_grows():
         assert np.isfinite(found.velocity).all()
     assert found.doubt == 'no contact: no foot stands'
     assert found.covariance[6, 6] > 4.0 * stood.covariance[6, 6]
-    assert not any(foot.in_contact or foot.left_out for foot in found.feet)
+    assert not any(foot.in_contact or foot.excluded for foot in found.feet)
     for _ in range(50):
         found = motion.step()
     assert found.doubt == ''

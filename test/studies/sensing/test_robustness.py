@@ -66,7 +66,7 @@ def test_a_reversed_joint_is_named_by_its_leg(log, joint):
     assert found[-1].doubt.startswith('kinematics: leg FL moves against the other legs')
     assert rms(error[1500:]) < 0.015  # the other legs carry the estimate
     front = [each.feet[0] for each in found[1500:] if each.feet[0].in_contact]
-    assert np.mean([foot.left_out for foot in front]) > 0.9
+    assert np.mean([foot.excluded for foot in front]) > 0.9
 
 
 def test_a_wrong_foot_link_is_named_by_its_leg(log):
