@@ -39,7 +39,7 @@ LOST, ALIKE = 2.0, 0.03
 PATIENCE = 0.015
 
 # Slip velocity of a foot that does not stand, in standard deviations.
-TOO_FAST = 5.0
+TOO_FAST = 4.0
 
 # What a body shakes between samples, which the accelerometer shows in part, m/s².
 SHAKES = 0.1
@@ -360,7 +360,10 @@ class BodyEstimator:
         slow = feet.standing & ~fresh & (speeds < 2.5)
         feet.slow_since = np.where(slow, np.minimum(feet.slow_since, time), math.inf)
         feet.excluded |= fresh
-        feet.excluded &= ~(time - feet.slow_since >= PATIENCE)
+        sticks = time - feet.slow_since >= PATIENCE
+        # After a doubt one foot may be slow by chance, two are not.
+        if time - feet.held < RECOVERY or sticks.sum() > 1:
+            feet.excluded &= ~sticks
         sticking = feet.standing & ~feet.excluded
         if sticking.any():
             feet.held = time
