@@ -91,8 +91,12 @@ class BodyFilter:
     def lose(self, turn: float = 0.01, velocity: float = 1.0) -> None:
         """Let rotation and velocity be less known, by so much, rad and m/s, as after a gap."""
         _diagonal(self.covariance)[_SPEED] += velocity**2
-        _diagonal(self.covariance)[_TURN] += turn**2
         _diagonal(self.covariance)[_PLACE] += velocity**2
+        # The body turns, and neither its velocity nor its footholds with it.
+        turned = np.zeros((len(self.covariance), 3))
+        turned[_TURN], turned[_SPEED] = turn * _UNIT, turn * skew(self.velocity)
+        turned[FEET:] = turn * skew(self.footholds).reshape(-1, 3)
+        self.covariance += turned @ turned.T
 
     def predict(self, dt: float, gyro: Array, force: Array, rolling: Array) -> Array:
         """Advance by a step; return its mean velocity, (3,), m/s.

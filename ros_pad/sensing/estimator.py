@@ -361,8 +361,8 @@ class BodyEstimator:
         feet.slow_since = np.where(slow, np.minimum(feet.slow_since, time), math.inf)
         feet.excluded |= fresh
         sticks = time - feet.slow_since >= PATIENCE
-        # After a doubt one foot may be slow by chance, two are not.
-        if time - feet.held < RECOVERY or sticks.sum() > 1:
+        # After a doubt one foot of several may be slow by chance, two are not.
+        if time - feet.held < RECOVERY or sticks.sum() >= min(2, feet.standing.sum()):
             feet.excluded &= ~sticks
         sticking = feet.standing & ~feet.excluded
         if sticking.any():

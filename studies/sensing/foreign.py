@@ -7,8 +7,7 @@ https://github.com/ami-iit/paper_ramadoss-2022-iros-humanoid-base-estimation (BS
 h5py), and from https://github.com/mrsp/serow (GPL-3.0) evaluation/unit_tests/data/go1.csv,
 urdf/go1.urdf, and test/data/go1_odom.csv of commit 9201120.
 
-The estimator runs beside the rivals of the study sensing, and with feet and legs whose size is
-fixed to that of the file. Cameras saw the base, with a clock of
+The estimator runs beside the rivals of the study sensing. Cameras saw the base, with a clock of
 their own (without times on the Go1): its offset, and its rate where unknown, are those at which
 the heading by the gyro is the one that the cameras saw. The truth about slip is not known: feet of
 the iCub should stick. Velocities of the cameras are means over 0.2 s, and so are those compared.
@@ -29,15 +28,10 @@ from ros_pad.robots.rotation import Array, rotation
 from studies import command
 from studies.samples import Flags
 from studies.sensing import recordings
-from studies.sensing.methods import METHODS as RIVALS
-from studies.sensing.methods import Track, estimated, track_of
+from studies.sensing.methods import METHODS, Track, track_of
 from studies.sensing.recordings import Recording
 from studies.sensing.study import alarms_of, settled
 from studies.sensing.walks import Course, Log
-
-FIXED = 'fixed size'
-METHODS = (RIVALS[0], FIXED, *RIVALS[1:])
-"""Methods of the study sensing, and the estimator that learns nothing of the robot's size."""
 
 MEAN = 0.2
 """Time over which velocities of the body are averaged, s."""
@@ -163,11 +157,7 @@ def measure(recording: Recording) -> list[Row]:
     walks = (time >= fast[0]) & (time <= fast[-1])
     rows = []
     for method in METHODS:
-        track = (
-            estimated(recording.robot, log, course, sizes=False)
-            if method == FIXED
-            else track_of(recording.robot, log, course, method)
-        )
+        track = track_of(recording.robot, log, course, method)
         places = turned(_at(at, time, track.position), seen)
         mean = (places[apart:] - places[:-apart]) * rate / apart
         error = (mean - velocity)[:, :2]

@@ -81,16 +81,6 @@ def paced(slipping, seconds=12.0):
     return legs
 
 
-def test_a_robot_slips_as_a_whole_where_now_and_then_no_foot_sticks():
-    together = paced(lambda row: np.full(4, (row * 0.618) % 1.0 < 0.6))
-    assert together.slippery == pytest.approx(0.25, abs=0.03)
-    # In a trot two feet are in the air; here their sensors read something there.
-    in_turns = paced(lambda row: np.array([True, False, False, True]) ^ bool(row // 60 % 2))
-    assert in_turns.share == pytest.approx(0.5, abs=0.05)
-    assert in_turns.slippery == 0.0
-    assert paced(lambda row: np.full(4, (row * 0.618) % 1.0 < 0.2)).slippery == 0.0
-
-
 def swung(offset, lasts=0.05, seconds=6.0, seed=4):
     """Return the Unloaded of four feet, the last one off by ``offset``, N, and its errors.
 

@@ -53,9 +53,6 @@ def test_honest_readings_leave_no_doubt_and_no_delay(log):
     assert {each.doubt for each in found} == {''}
     assert rms(error[750:]) < 0.012  # m/s, "must" of issue 16 on patches
     assert abs(estimator.delay[0]) < 1.5e-3
-    # The sphere of 22 mm sinks in by 2 to 3 mm.
-    assert 0.014 < estimator.foot_radius[0] < 0.024
-    assert abs(estimator.length_error[0]) < 0.03
 
 
 @pytest.mark.parametrize('joint', [2])
@@ -76,27 +73,6 @@ def test_a_wrong_foot_link_is_named_by_its_leg(log):
     assert 'kinematics' in doubts(found)
     named = [each.doubt for each in found if each.doubt.startswith('kinematics: leg')]
     assert all('leg FL moves' in doubt for doubt in named)
-
-
-@pytest.mark.parametrize('factor', [1.1])
-def test_legs_of_another_length_are_in_doubt_and_then_estimated(log, factor):
-    stretch = np.diag([factor, factor, factor, 1.0])
-    legs = [
-        [
-            joint
-            if index == 0
-            else dataclasses.replace(joint, at=stretch @ joint.at @ np.linalg.inv(stretch))
-            for index, joint in enumerate(leg)
-        ]
-        for leg in GO2.chains.legs
-    ]
-    feet = stretch @ GO2.chains.feet @ np.linalg.inv(stretch)
-    robot = dataclasses.replace(GO2, chains=Chains(legs, feet))
-    found, error, estimator = run(log, robot)
-    assert any('longer or shorter' in each.doubt for each in found)
-    assert found[-1].doubt == ''
-    assert estimator.length_error[0] == pytest.approx(1.0 / factor - 1.0, abs=0.05)
-    assert rms(error[2000:]) < 0.012
 
 
 @pytest.mark.parametrize('delay', [0.006])
