@@ -47,12 +47,13 @@ class Stance:
 
 
 def test_the_alarm_waits_longer_where_the_velocity_is_less_certain():
-    # A CUSUM test for v1 gains v1/s² (v - v1/2) a sample, s² = sd² times correlation time over
-    # period (0.15 s, 4 ms); the test for 30 mm/s reaches 4 nats first.
-    for sd in (0.005, 0.01, 0.02):
-        gain = 0.03 / ((sd**2 + 0.002**2) * 0.15 / 0.004) * (0.06 - 0.015)
-        count = Stance(sd).slide(0.06, 300)
-        assert count == pytest.approx(4.0 / gain, abs=1.5)
+    # It counts what is faster than three deviations, of the body's velocity and 2 mm/s.
+    for sd, speed in [(0.005, 0.06), (0.01, 0.06), (0.02, 0.1)]:
+        faster = speed - 3.0 * math.hypot(sd, 0.002)
+        count = Stance(sd, dataclasses.replace(JOINTS, pads_shear=False)).slide(speed, 300)
+        # The first sample begins a stance, and counts for 2 ms.
+        assert count == 1 + math.ceil((5e-4 / faster - 0.002) / PERIOD)
+    assert Stance(0.02).slide(0.05, 100) is None
 
 
 def test_an_uncertain_velocity_teaches_less():
