@@ -3,9 +3,10 @@
 
 A slip is a displacement of the contact in one stance, of 3, 5 or 10 mm from where it was when the
 foot had landed, 24 ms after touch-down. It begins when the contact was last within a quarter of a
-millimetre of there, or at touch-down if it left within 24 ms more. It is found by an alarm that begins later in
-that stance: one that is already on finds nothing. A foot sticks while its contact moves less than
-half a millimetre from 0.1 s before to 60 ms after; an alarm that begins then is false.
+millimetre of there, or at touch-down if it left within 24 ms more. It is found by an alarm that
+begins later in that stance: one that is already on finds nothing. A foot sticks while its contact
+moves less than half a millimetre from 0.1 s before to 60 ms after; an alarm that begins then is
+false.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -102,7 +104,7 @@ def _judge(found: Alarms, on: Flags, place: Array, period: float) -> None:
             found.delays.append(float(later[0]) * period)
 
 
-def missed(walks: Sequence[Alarms], size: float) -> tuple[float, float, float]:
+def missed(walks: Sequence[Alarms], size: float) -> tuple[float | None, float, float]:
     """Return the share of slips of a size, m, that were missed, and its 95 % interval.
 
     By bootstrap over walks where there are several misses a walk, else Clopper and Pearson's.
@@ -112,10 +114,10 @@ def missed(walks: Sequence[Alarms], size: float) -> tuple[float, float, float]:
     low, high = share_interval(hits, count)
     if pairs and hits >= FEW * len(pairs):
         low, high = bootstrap(pairs, 2000)
-    return hits / count if count else math.nan, low, high
+    return hits / count if count else None, low, high
 
 
-def false_alarms(walks: Sequence[Alarms]) -> tuple[float, float, float]:
+def false_alarms(walks: Sequence[Alarms]) -> tuple[float | None, float, float]:
     """Return false alarms a minute of sticking, and their 95 % interval.
 
     By bootstrap over walks where there are several a walk, else that of a Poisson process: with
@@ -123,7 +125,7 @@ def false_alarms(walks: Sequence[Alarms]) -> tuple[float, float, float]:
     """
     count, minutes = (sum(getattr(each, name) for each in walks) for name in ('false', 'minutes'))
     if not minutes:
-        return math.nan, 0.0, math.inf
+        return None, 0.0, math.inf
     if count >= FEW * len(walks):
         low, high = bootstrap([(each.false, each.minutes) for each in walks], 2000)
         return count / minutes, low, high
@@ -132,10 +134,10 @@ def false_alarms(walks: Sequence[Alarms]) -> tuple[float, float, float]:
     return count / minutes, float(low) / minutes, float(high) / minutes
 
 
-def row_of(walks: Sequence[Alarms]) -> dict[str, object]:
+def row_of(walks: Sequence[Alarms]) -> dict[str, Any]:
     """Return slips, shares missed, false alarms a minute with intervals, minutes and latency."""
     delays = [each for walk in walks for each in walk.delays]
-    found: dict[str, object] = {}
+    found: dict[str, Any] = {}
     for size in SIZES:
         name = f'{1e3 * size:g}_mm'
         found[f'slips_{name}'] = sum(each.slips[size] for each in walks)

@@ -19,6 +19,7 @@ import numpy as np
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.control import POLICIES
 from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.sensing import BodyEstimate
 from ros_pad.simulation import Scene
@@ -26,10 +27,9 @@ from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.series import held
 from ros_pad.trials.trial import heading
-from studies import command
+from studies import command, slips
 from studies.closed_loop import loops
 from studies.samples import runs
-from studies.work_precision.estimator.tally import MOVING, Tally, count_alarms
 
 SCENES = ('hexapod_patches', 'quadruped_patches')
 FIRST_SEED = 401  # earlier ones were used while the code was written and mended
@@ -37,6 +37,7 @@ GATE = 0.3
 """Share of the expected load above which a foot stands."""
 
 BEGINS = 2.0  # s: from then on the robot walks
+MOVING = 5e-3  # m/s: a faster contact slips
 STICKS = 0.9
 """Share of a stance in which at least one foot must stick for its verdict to count."""
 
@@ -53,6 +54,8 @@ class Walk:
         Time of each sample, s.
     load, speed : ndarray
         True normal force, N, and slip speed, m/s.
+    place : ndarray, shape (samples, legs, 2)
+        True places of the contacts, m.
     alarm, wet, flat : ndarray of bool
         Slip alarm, true ground, and whether the pad is flat.
     probability : ndarray
@@ -66,8 +69,6 @@ class Walk:
         True distance, m.
     verdict : str or None
         Why the walk ended early.
-    sticks_only : bool
-        As for the recordings of ``work_precision.estimator``; always False here.
     """
 
     period: float
@@ -75,6 +76,7 @@ class Walk:
     stamps: np.ndarray
     load: np.ndarray
     speed: np.ndarray
+    place: np.ndarray
     alarm: np.ndarray
     wet: np.ndarray
     flat: np.ndarray
@@ -83,7 +85,6 @@ class Walk:
     doubt: float
     distance: float
     verdict: str | None
-    sticks_only: bool = False
 
 
 class _Truth:
@@ -118,10 +119,14 @@ def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk
     truth = _Truth(robot)
     rows = []
     for _ in loop.walk():
-        rows.append([(foot.force[2], foot.slip_speed, foot.wet) for foot in robot.feet])
+        rows.append(
+            [(*foot.force, foot.slip_speed, foot.wet, *foot.position[:2]) for foot in robot.feet]
+        )
         if loop.body:
             truth.compare(loop.body.estimate)
-    load, speed, wet = np.moveaxis(np.array(rows, dtype=float), 2, 0)
+    table = np.array(rows, dtype=float)
+    load, speed, wet = np.moveaxis(table[..., 2:5], 2, 0)
+    place = table[..., 5:] + table[..., :2] / scene.foot.shear_stiffness
     stamps = loop.period_ns * np.arange(1, len(rows) + 1)
     estimate = loops.estimated(
         EstimationStage(
@@ -135,6 +140,7 @@ def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk
         1e-9 * stamps,
         load,
         speed,
+        place,
         held(estimate.stamps, estimate.rows['slipping'], stamps) == 1.0,
         wet > 0.5,
         loops.pressures(log.records, stamps) < DOME_PRESSURE,
@@ -169,23 +175,22 @@ def verdicts(walk: Walk) -> tuple[int, int]:
 
 def summary(walks: Sequence[Walk]) -> dict[str, Any]:
     """Return the figures of the walks of one policy and one sensing."""
-    tally = Tally()
     right = total = 0
     for walk in walks:
-        count_alarms(tally, walk, walk.alarm)  # type: ignore[arg-type]
         found = verdicts(walk)
         right, total = right + found[0], total + found[1]
-    delays = [each for each in tally.delays if math.isfinite(each)]
+    alarms = [
+        slips.judged(
+            walk.alarm, walk.load > LOAD_GATE * walk.expected_load, walk.place, walk.period, BEGINS
+        )
+        for walk in walks
+    ]
     figures: dict[str, Any] = {
         'distance_m': [walk.distance for walk in walks],
         'ended_early': [walk.verdict for walk in walks if walk.verdict],
         'stances': total,
         'verdict_right': right / total if total else None,
-        'slips': tally.slips,
-        'missed': tally.missed,
-        'delay_s': float(np.median(delays)) if delays else None,
-        'stick_s': tally.stick_time,
-        'false_alarms': tally.false_alarms,
+        **slips.row_of(alarms),
         'doubt': float(np.mean([walk.doubt for walk in walks])),
     }
     rows = np.concatenate([walk.body for walk in walks])

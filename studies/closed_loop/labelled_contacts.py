@@ -27,7 +27,7 @@ from matplotlib.figure import Figure
 from ros_pad.contact.resistance import Foot, expected_friction
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.alarm import SLOW_SLIP, SMOOTHING, SPEED_NOISE, SlipAlarm
+from ros_pad.estimation.alarm import SLOWEST_SLIP, SURE, SlipAlarm
 from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
 from ros_pad.estimation.ground import RATIO_NOISE
 from ros_pad.estimation.scales import FrictionScales
@@ -254,19 +254,17 @@ def features(recording: Recording) -> dict[str, np.ndarray]:
 
 
 def cusum(recording: Recording, speed: np.ndarray) -> np.ndarray:
-    """Return the statistic of ros_pad's slip alarm for a speed, m/s.
+    """Return the displacement, m, of ros_pad's slip alarm for a speed, m/s.
 
-    The noise is the speed of the quiet foot with the model error of the estimator. Nothing else is
-    fitted to the robot: the alarm tests for its default slip speed.
+    The noise is the speed of the quiet foot. Nothing else is fitted to the robot.
     """
-    noise = math.hypot(recording.usual(speed), SPEED_NOISE)
-    alarm = SlipAlarm(SMOOTHING, (SLOW_SLIP,))
+    allowed = max(SLOWEST_SLIP, SURE * recording.usual(speed))
     statistic = np.zeros(len(speed))
     for start, stop in recording.stances:
-        alarm.reset()
+        alarm = SlipAlarm()
         for index in range(start, stop):
-            alarm.update(float(speed[index]), noise, PERIOD)
-            (statistic[index],) = alarm.statistics
+            alarm.update(float(speed[index]), allowed, math.inf, PERIOD)
+            statistic[index] = alarm.displacement
     return statistic
 
 

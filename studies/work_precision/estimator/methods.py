@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -26,10 +28,16 @@ from studies.work_precision.estimator.tally import (
 )
 from studies.work_precision.estimator.walks import Flags, Recording
 
-RATIO, CUSUM, SHIPPED = 'T/N', 'CUSUM', 'FootEstimator, alarm'
+RATIO, CUSUM, SHIPPED = 'T/N', 'displacement', 'FootEstimator, alarm'
+LIKELIHOOD, GLR, STATES = 'CUSUM of likelihoods', 'GLR', 'two states'
 RATIOS = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.3, 0.4, 0.6)
-CUSUM_SPEEDS = (0.01, 0.02, 0.04)  # m/s
-CUSUM_THRESHOLDS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+CUSUM_SPEEDS = (0.005, 0.01, 0.02)  # m/s
+DISTANCES = (1e-4, 2e-4, 3.5e-4, 5e-4, 1e-3, 2e-3)  # m
+NATS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+ODDS = (0.0, 2.0, 4.0, 8.0, 16.0)  # logarithms
+SLIP_SPEED = 0.03  # m/s, of the tests of likelihood
+LASTS = 0.3  # s, mean time for which a foot sticks, or slips
+WINDOW = 0.3  # s, longest of the GLR
 
 Settings: TypeAlias = tuple[Foot, float, Tuning]
 """Arguments of an estimator."""
@@ -84,25 +92,85 @@ class SlipSpeed:
         return -along / (SMOOTHING * (math.hypot(push_x, push_y) or math.inf)), dt
 
 
-def cusum_alarm(settings: Settings, speed: float, threshold: float) -> Update:
-    """Return the test of :class:`SlipAlarm`, a CUSUM, on the slip speed."""
+Test: TypeAlias = Callable[[float, float, float], bool]
+"""Processes slip speed, m/s, its noise, m/s, and the time since the last, s; returns the alarm."""
+
+
+def speed_alarm(settings: Settings, test_of: Callable[[], Test]) -> Update:
+    """Return an alarm by a test of the slip speed that begins anew with each stance."""
     foot, _, tuning = settings
-    slip = SlipSpeed(settings)
-    alarm = SlipAlarm(SMOOTHING, (speed,), threshold)
+    slip, test = SlipSpeed(settings), test_of()
     noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
     noise = math.hypot(noise / SMOOTHING, SPEED_NOISE)
 
     def update(
         time: float, force: Sequence[float], position: Sequence[float], pressure: float
     ) -> bool:
+        nonlocal test
         found = slip.update(time, force, position)
         if found is None:
-            alarm.reset()
+            test = test_of()
             return False
-        speed, dt = found
-        return alarm.update(speed, noise, dt)
+        return test(found[0], noise, found[1])
 
     return update
+
+
+def displacement(allowed: float, distance: float) -> Test:
+    """Return the test of :class:`SlipAlarm`."""
+    alarm = SlipAlarm()
+    return lambda speed, _, dt: alarm.update(speed, allowed, distance, dt)
+
+
+def likelihoods(threshold: float) -> Test:
+    """Return Page's CUSUM of the likelihood ratio of a slip at :data:`SLIP_SPEED`."""
+    statistic = 0.0
+
+    def test(speed: float, noise: float, dt: float) -> bool:
+        nonlocal statistic
+        gain = SLIP_SPEED / (noise * noise * max(SMOOTHING / dt, 1.0))
+        statistic = max(0.0, statistic + gain * (speed - 0.5 * SLIP_SPEED))
+        raised = statistic > threshold
+        statistic = min(statistic, 1.25 * threshold)
+        return raised
+
+    return test
+
+
+def generalised(threshold: float) -> Test:
+    """Return a generalised likelihood ratio: the best speed since the best beginning."""
+    path: deque[tuple[float, float]] = deque([(0.0, 0.0)])  # time and distance
+
+    def test(speed: float, noise: float, dt: float) -> bool:
+        now, place = path[-1][0] + dt, path[-1][1] + speed * dt
+        path.append((now, place))
+        while now - path[0][0] > WINDOW:
+            path.popleft()
+        return any(
+            place > before
+            and (place - before) ** 2 > 4.0 * threshold * noise**2 * SMOOTHING * (now - begin)
+            for begin, before in path
+            if now - begin > SMOOTHING
+        )
+
+    return test
+
+
+def two_states(threshold: float) -> Test:
+    """Return a hidden Markov model of stick and slip; the threshold is that of the log odds."""
+    share = 1e-3
+
+    def test(speed: float, noise: float, dt: float) -> bool:
+        nonlocal share
+        share += dt / LASTS * (1.0 - 2.0 * share)
+        wide = math.hypot(noise, 0.5 * SLIP_SPEED)
+        ratio = math.log(noise / wide) + 0.5 * (speed / noise) ** 2
+        ratio -= 0.5 * ((speed - SLIP_SPEED) / wide) ** 2
+        odds = math.log(share / (1.0 - share)) + ratio * min(dt / SMOOTHING, 1.0)
+        share = 1.0 / (1.0 + math.exp(-min(max(odds, -30.0), 30.0)))
+        return odds > threshold
+
+    return test
 
 
 def shipped_alarm(settings: Settings) -> Update:
@@ -125,12 +193,21 @@ class Method:
 def methods() -> list[Method]:
     """Return every method with its thresholds."""
     found = [Method(RATIO, '', r, '', lambda s, r=r: ratio_alarm(s, r)) for r in RATIOS]  # type: ignore[misc]
-    for speed in CUSUM_SPEEDS:
-        found += [
-            Method(CUSUM, f'{1e3 * speed:g} mm/s', t, '',
-                   lambda s, v=speed, t=t: cusum_alarm(s, v, t))  # type: ignore[misc]
-            for t in CUSUM_THRESHOLDS
-        ]  # fmt: skip
+    tests: list[tuple[str, str, str, Sequence[float], Callable[[float], Test]]] = [
+        (CUSUM, f'{1e3 * speed:g} mm/s', 'm', DISTANCES, functools.partial(displacement, speed))
+        for speed in CUSUM_SPEEDS
+    ]
+    tests += [
+        (LIKELIHOOD, '', 'nats', NATS, likelihoods),
+        (GLR, '', 'nats', NATS, generalised),
+        (STATES, '', 'nats', ODDS, two_states),
+    ]
+    for name, variant, unit, thresholds, test in tests:
+        for value in thresholds:
+            made = functools.partial(test, value)
+            found.append(
+                Method(name, variant, value, unit, lambda s, made=made: speed_alarm(s, made))  # type: ignore[misc]
+            )
     return [*found, Method(SHIPPED, '', 0.0, '', shipped_alarm)]
 
 

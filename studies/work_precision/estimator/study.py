@@ -5,13 +5,9 @@ A hexapod walks in closed loop on floors with wet patches and on the thesis' wet
 The readings of its sensors are recorded once, with the truth, and each method gets the same
 readings.
 
-The truth is the motion of the contact over the floor. A *slip* is an interval with more than 5
-mm/s under more than 0.15 of the expected load, with gaps below 20 ms; slips of more than 3 mm
-count. A slip is *missed* if no alarm is on until 60 ms after its end. A *stick* is a time at which
-the contact moves less than 0.5 mm from 0.3 s before to 60 ms after; an alarm that starts in a
-stick, or continues into it, is *false*. With full dynamics (L2), feet on dry ground scrub all the
-time. So walks in the plane (L1), and standing feet that are pulled to and fro, are added for
-sticks.
+The truth is the motion of the contact over the floor; slips and false alarms are those of
+studies/slips.py. With full dynamics (L2), feet on dry ground scrub all the time. So walks in the
+plane (L1), and standing feet that are pulled to and fro, are added for sticks.
 
 Walks with noise that is larger, or configured wrong, are counted on floors on which settings were
 chosen and on others, with intervals over walks.

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import bisect
 import math
-import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,15 +13,12 @@ import numpy as np
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation.friction import GroundModel
+from ros_pad.estimation.track import LOAD_GATE
+from studies import slips
 from studies.samples import bootstrap
+from studies.slips import Alarms, judged
 from studies.work_precision.estimator.walks import LOADED, SETTLED, Flags, Floats, Recording
 
-MOVING = 5e-3  # m/s: a faster contact slips
-BRIDGED = 0.02  # s: shorter gaps do not split a slip
-COUNTS = 3e-3  # m: shorter slips are not counted
-LATE = 0.06  # s: an alarm up to this time after a slip still counts for it
-BEFORE = 0.3  # s: in a stick, the contact has stood still for this time
-STILL = 5e-4  # m: motion that is allowed in a stick
 STANCE = 0.1  # s: shorter stances are not counted for wetness
 
 
@@ -94,17 +89,8 @@ class Tally:
 
     Attributes
     ----------
-    slips, missed : int
-        Numbers of slips, and of missed ones.
-    displaced, displaced_missed : int
-        The same of slips at whose end the contact was as far away as slips must be long: a foot
-        that lands chatters.
-    delays, slip_distances : list of float
-        For each slip that did not begin in an alarm, time, s, and slip distance, m, until the
-        alarm; infinite if missed.
-    false_alarms : int
-    stick_time : float
-        Total time of sticks, s.
+    alarms : list of Alarms
+        What the alarm did, for each walk.
     wet_ends : list of tuple
         For each flat stance, whether it was wet, and P(wet) at its end.
     covered, below : dict of list of array
@@ -112,14 +98,7 @@ class Tally:
         2 sigma, and whether the true margin was below its estimated 5 % quantile.
     """
 
-    slips: int = 0
-    missed: int = 0
-    displaced: int = 0
-    displaced_missed: int = 0
-    delays: list[float] = field(default_factory=list)
-    slip_distances: list[float] = field(default_factory=list)
-    false_alarms: int = 0
-    stick_time: float = 0.0
+    alarms: list[Alarms] = field(default_factory=list)
     wet_ends: list[tuple[bool, float]] = field(default_factory=list)
     covered: dict[str, list[Flags]] = field(default_factory=dict)
     below: dict[str, list[Flags]] = field(default_factory=dict)
@@ -137,68 +116,18 @@ class Tally:
 def counted(walk: Recording) -> Tally:
     """Return the counts of the estimator on a walk."""
     tally, estimates = Tally(), replay(walk)
-    count_alarms(tally, walk, estimates.slipping, walk.place)
+    count_alarms(tally, walk, estimates.slipping)
     count_estimates(tally, walk, estimates)
     return tally
 
 
-def slips(speed: Floats, load: Floats, period: float, gate: float) -> Iterator[tuple[int, int]]:
-    """Yield first and last sample of each stretch of motion under load, of any length."""
-    moving = (speed > MOVING) & (load > gate)
-    unloaded = np.concatenate([[0], np.cumsum(load <= gate)])
-    found = np.flatnonzero(moving)
-    if not len(found):
-        return
-    # Split at gaps that are too long, or in which the foot was unloaded.
-    gaps = np.diff(found)
-    lifted = unloaded[found[1:]] > unloaded[found[:-1]]
-    cut = (gaps > round(BRIDGED / period)) | lifted
-    starts = found[np.concatenate([[True], cut])]
-    ends = found[np.concatenate([cut, [True]])]
-    yield from zip(starts.tolist(), ends.tolist(), strict=True)
-
-
-def count_alarms(
-    tally: Tally, walk: Recording, alarms: Flags, place: Floats | None = None
-) -> None:
-    """Add delays, misses and false alarms of alarms, array (samples, legs), to a tally.
-
-    With the places of the contacts, m, slips that displaced them are counted as well.
-    """
-    period, count = walk.period, len(walk.stamps)
-    gate = LOADED * walk.expected_load
-    settled, late, before = (round(span / period) for span in (SETTLED, LATE, BEFORE))
-    sample = np.arange(count)
-    for leg in range(alarms.shape[1]):
-        on, load, speed = alarms[:, leg], walk.load[:, leg], walk.speed[:, leg]
-        path = np.concatenate([[0.0], np.cumsum(speed) * period])
-        lasts = np.minimum(count, sample + late + 1)
-        stick = path[lasts] - path[np.maximum(0, sample - before)] < STILL
-        stick &= (load > gate) & (sample >= settled)
-        tally.stick_time += float(stick.sum()) * period
-        false = on & stick
-        tally.false_alarms += int((false[1:] & ~false[:-1]).sum())
-        if walk.sticks_only:
-            continue
-        alarms_at = np.flatnonzero(on).tolist()
-        for first, last in slips(speed, load, period, gate):
-            if first < settled or path[last + 1] - path[first] <= COUNTS:
-                continue
-            near = bisect.bisect_left(alarms_at, first)
-            alarmed = near < len(alarms_at) and alarms_at[near] <= last + late
-            tally.slips += 1
-            if place is not None and math.dist(place[first, leg], place[last, leg]) > COUNTS:
-                tally.displaced += 1
-                tally.displaced_missed += not alarmed
-            if not alarmed:
-                tally.missed += 1
-                tally.delays.append(math.inf)
-                tally.slip_distances.append(math.inf)
-            elif alarms_at[near] > first:
-                tally.delays.append((alarms_at[near] - first) * period)
-                # If the slip ended before the alarm, this is its whole distance.
-                end = min(alarms_at[near], last + 1)
-                tally.slip_distances.append(float(path[end] - path[first]))
+def count_alarms(tally: Tally, walk: Recording, alarms: Flags) -> None:
+    """Add what alarms, array (samples, legs), did to a tally."""
+    loaded = walk.load > LOAD_GATE * walk.expected_load
+    found = judged(alarms, loaded, walk.place, walk.period, SETTLED)
+    if walk.sticks_only:
+        found = Alarms(false=found.false, minutes=found.minutes)
+    tally.alarms.append(found)
 
 
 def count_estimates(tally: Tally, walk: Recording, estimates: Estimates) -> None:
@@ -256,17 +185,11 @@ class Row:
     unit : str
     shipped : bool
         Whether this is the estimator as shipped, under ordinary conditions.
-    delay, slip_distance : float or None
-        Medians of time, s, and distance slipped, m, before the alarm, over slips that did not
-        begin in one; None where more than half of these are missed, or of all began in one.
+    delay : float or None
+        Median of the times before the alarm, s, of slips of 5 mm.
     misses : float or None
-        Share of slips that are missed.
-    already : float or None
-        Share of slips that began in an alarm.
+        Share of slips of 5 mm that are missed.
     slips : int
-    displaced_misses : float or None
-        Share of slips that are missed, of those that displaced the contact by as much as counts.
-    displaced : int
     false_per_minute : float or None
         False alarms in a minute of stick.
     stick_minutes : float
@@ -296,12 +219,8 @@ class Row:
     unit: str
     shipped: bool
     delay: float | None
-    slip_distance: float | None
     misses: float | None
-    already: float | None
     slips: int
-    displaced_misses: float | None
-    displaced: int
     false_per_minute: float | None
     stick_minutes: float
     us_per_update: float | None
@@ -319,20 +238,15 @@ class Row:
 
 def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Row:
     """Return the row of a tally."""
-    minutes = tally.stick_time / 60.0
-    timed = 2 * len(tally.delays) >= tally.slips
+    found = slips.row_of(tally.alarms)
     probabilities = np.array(tally.wet_ends, dtype=np.float64).reshape(-1, 2)
     wet, estimated = probabilities.T
     return Row(
-        delay=_median(tally.delays) if timed else None,
-        slip_distance=_median(tally.slip_distances) if timed else None,
-        misses=tally.missed / tally.slips if tally.slips else None,
-        already=1.0 - len(tally.delays) / tally.slips if tally.slips else None,
-        slips=tally.slips,
-        displaced_misses=tally.displaced_missed / tally.displaced if tally.displaced else None,
-        displaced=tally.displaced,
-        false_per_minute=tally.false_alarms / minutes if minutes else None,
-        stick_minutes=minutes,
+        delay=found['latency_s'],
+        misses=found['missed_5_mm'],
+        slips=found['slips_5_mm'],
+        false_per_minute=found['false_alarms_a_minute'],
+        stick_minutes=found['minutes_of_sticking'],
         us_per_update=us_per_update,
         brier=_mean((estimated - wet) ** 2),
         wet_right=_mean((estimated > 0.5) == (wet > 0.5)),
@@ -351,9 +265,6 @@ def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
     for each in tallies:
         whole.add(each)
     parts: dict[str, list[tuple[float, float]]] = {
-        'misses': [(each.missed, each.slips) for each in tallies],
-        'displaced_misses': [(each.displaced_missed, each.displaced) for each in tallies],
-        'false_per_minute': [(each.false_alarms, each.stick_time / 60.0) for each in tallies],
         'wet_right': [
             (sum((p > 0.5) == wet for wet, p in each.wet_ends), len(each.wet_ends))
             for each in tallies
@@ -364,13 +275,11 @@ def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
         ],
     }
     found = {name: bootstrap(pairs, 2000) for name, pairs in parts.items()}
-    intervals = {name: list(ends) for name, ends in found.items() if math.isfinite(ends[0])}
+    alarms = slips.row_of(whole.alarms)
+    found['misses'] = alarms['missed_5_mm_interval']
+    found['false_per_minute'] = alarms['false_alarms_interval']
+    intervals = {name: list(ends) for name, ends in found.items() if math.isfinite(sum(ends))}
     return row_of(whole, walks=len(tallies), intervals=intervals, **names)
-
-
-def _median(values: Sequence[float]) -> float | None:
-    median = statistics.median(values) if values else math.inf
-    return median if math.isfinite(median) else None
 
 
 def _mean(values: Any) -> float | None:
