@@ -66,12 +66,13 @@ def judged(on: Flags, loaded: Flags, place: Array, period: float, begin: float) 
     period : float
         Between samples, s.
     begin : float
-        Time from which stances count, s.
+        Time from which samples count, s.
     """
     found = Alarms()
     for leg in range(on.shape[1]):
         for first, last in runs(loaded[:, leg]):
-            if first * period >= begin and (last - first) * period > 2.0 * LANDING:
+            first = max(first, round(begin / period))
+            if (last - first) * period > 2.0 * LANDING:
                 stance = slice(first, last)
                 _judge(found, on[stance, leg], place[stance, leg], period)
     return found

@@ -276,8 +276,10 @@ def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
     }
     found = {name: bootstrap(pairs, 2000) for name, pairs in parts.items()}
     alarms = slips.row_of(whole.alarms)
-    found['misses'] = alarms['missed_5_mm_interval']
-    found['false_per_minute'] = alarms['false_alarms_interval']
+    if alarms['slips_5_mm']:
+        found['misses'] = alarms['missed_5_mm_interval']
+    if alarms['minutes_of_sticking']:
+        found['false_per_minute'] = alarms['false_alarms_interval']
     intervals = {name: list(ends) for name, ends in found.items() if math.isfinite(sum(ends))}
     return row_of(whole, walks=len(tallies), intervals=intervals, **names)
 

@@ -31,7 +31,6 @@ STATUSES = ('thesis', 'measured', 'data', 'derived', 'assumed', 'chosen')
 # Classes and functions, by module, with numeric defaults that the thesis does not give.
 TUNED = {
     'estimation/tuning.py': ('Tuning',),
-    'estimation/alarm.py': ('SlipAlarm',),
     'estimation/friction.py': ('GroundModel',),
     'control/morphology.py': ('MorphologyController',),
     'control/policies.py': ('adaptive',),

@@ -24,6 +24,7 @@ def made_up(**changes):
         STAMPS,
         np.where(stands, 10.0, 0.0),
         np.zeros(shape),
+        np.zeros((*shape, 2)),
         np.zeros(shape, dtype=bool),
         np.ones(shape, dtype=bool),
         np.ones(shape, dtype=bool),
@@ -58,10 +59,12 @@ def test_slips_alarms_and_deviations_are_counted():
     alarm = np.zeros((SAMPLES, 2), dtype=bool)
     alarm[:, 0] = slips & (STAMPS % 4.0 < 2.0)  # every second slip is missed
     errors = np.array([[0.01, 0.01]] * 3 + [[0.03, 0.01]])
-    row = joints.summary([made_up(speed=speed, alarm=alarm, body=errors)])
-    assert row['slips'] == 8
-    assert row['missed'] == 4
-    assert row['false_alarms'] == 0
+    place = np.cumsum(speed, axis=0)[..., None] * np.array((0.004, 0.0))
+    changes = {'speed': speed, 'place': place, 'alarm': alarm, 'body': errors}
+    row = joints.summary([made_up(**changes)])
+    assert row['slips_5_mm'] == 8
+    assert row['missed_5_mm'] == 0.5
+    assert row['false_alarms_a_minute'] == 0.0
     assert row['body_coverage'] == 0.75
     assert row['body_rmse_m_s'] == pytest.approx(((3 * 0.01**2 + 0.03**2) / 4) ** 0.5)
 
