@@ -319,7 +319,7 @@ def test_a_replay_of_the_bag_is_equal_to_the_bit(walked):
     for each in of_body:
         assert (each.equal, each.missing, each.not_recorded) == (WALKED, 0, 0)
     # Without the velocities it is another estimate: nothing of markers is in this bag.
-    settings = NodeSettings.of(bag).changed({'alarm.threshold': 1.0})
+    settings = NodeSettings.of(bag).changed({'alarm.distance': 1e-3})
     assert replay(bag, settings).verdict == 'different'
 
 

@@ -269,7 +269,7 @@ def test_times_of_day_that_jitter_are_no_difference(tmp_path):
     assert found.start_ns - start < 10 * MS and found.duration_s == pytest.approx(2.03, abs=0.02)
 
 
-def test_what_nodes_say_and_receive_before_the_first_estimate_is_excluded(tmp_path):
+def test_what_nodes_say_and_receive_before_the_first_estimate_is_left_out(tmp_path):
     """The recorder starts first, and the estimator receives samples from 4 ms on.
 
     Between samples, nodes tell of feet whose sensors are silent.

@@ -254,11 +254,11 @@ def test_points_are_means_with_students_interval():
     ]
     first, single, none = sweeps.points(rows, ['x'])
     assert first.labels == {'scene': 's', 'policy': 'flat', 'x': 1}
-    assert (first.walks, first.excluded) == (4, 2)
+    assert (first.walks, first.left_out) == (4, 2)
     low, high = scipy.stats.t.interval(0.95, 3, np.mean(ways), scipy.stats.sem(ways))
     assert (first.mean, first.low, first.high) == pytest.approx((np.mean(ways), low, high))
     assert (single.mean, single.low, single.high) == (0.2, None, None)
-    assert (none.walks, none.excluded, none.mean) == (0, 1, None)
+    assert (none.walks, none.left_out, none.mean) == (0, 1, None)
     assert math.isclose(first.high + first.low, 2.0 * first.mean)
 
 
