@@ -64,8 +64,6 @@ class Sole(FootState):
         Gauge pressure in the pads, Pa.
     cleared : bool
         Whether it left the ground in its present or last swing.
-    sprung : tuple of float
-        Depth, m, and pressure, Pa, for which its spring is set.
     """
 
     def __init__(self, film: Film, leg: int, model: Any, block: Any) -> None:
@@ -80,7 +78,7 @@ class Sole(FootState):
         self.inverse = float(model.body_invweight0[body, 0])
         self.film, self.block = film, block
         self.ratio = self.pressure = 0.0
-        self.cleared, self.sprung = True, (-1.0, 0.0)
+        self.cleared = True
 
 
 class Soles:
@@ -191,11 +189,7 @@ class Soles:
             if load > LIGHT:
                 self.press(sole, load, self._dt)
             ground = sole.block[2] if sole.block is not None else 0.0
-            depth = ground + POINT - height
-            sprung = depth if depth > 0.0 else 0.0, sole.pressure
-            if sprung != sole.sprung:
-                sole.sprung = sprung
-                self._give_way(sole, sprung[0])
+            self._give_way(sole, max(0.0, ground + POINT - height))
 
     def _give_way(self, sole: Sole, depth: float) -> None:
         """Set spring and damper of a foot at a depth, m, as an implicit step of them needs.

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
+from scipy.optimize import brentq
 
 from ros_pad import configuration
 from ros_pad.contact import Film, MeasuredLimit
@@ -309,7 +310,7 @@ def share_of_a_vacuum(centre, count=100):
 
 
 def test_suction_of_a_flat_sole_at_lift_off():
-    """By hand: 17 mm, a mean of 5.65 kPa, 0.6 s of water leave 8.0 um.
+    """By hand: 17 mm, a mean of 5.65 kPa, 0.6 s of water leave 8.0 um; 1.12 for slow voids.
 
     Atmosphere on 9.08 cm²: 92 N. The foot rises as 30 mm sin²(π t/0.4 s), 1.85 m/s² t².
     """
@@ -320,8 +321,44 @@ def test_suction_of_a_flat_sole_at_lift_off():
     height = 8.0e-6 + 0.5 * 3.701 * time**2
     centre = 3.0 * 1e-3 * 3.701 * time * 0.017**2 / (101325.0 * height**3)
     force = 92.0 * np.array([share_of_a_vacuum(each) for each in centre])
-    expected = trapezoid(force, time) / (6.834 * 0.6)
+    expected = 1.12 * trapezoid(force, time) / (6.834 * 0.6)
     assert bound(scene, 'suction') == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ('name', 'radius', 'film'), [('hexapod', 0.017, 8.0e-6), ('quadruped', 0.051, 26e-6)]
+)
+def test_voids_that_fill_slowly_are_within_the_bound(name, radius, film):
+    """Liquid runs into a void from its edge, at h²/(12 η) dp/dr, until air is let in at 0.3 mm."""
+    scene = Scene.load(f'{name}_patches')
+    swing = scene.gait.cycle - scene.gait.stance
+    rise = 2.0 * scene.gait.lift * (math.pi / swing) ** 2
+    vacuum, viscosity, step = 101325.0, 1e-3, 2e-6
+    impulse, time, edge, height = 0.0, 0.0, 0.0, film
+    while height < 3e-4:
+        time += step
+        height = film + 0.5 * rise * time**2
+        sucked = 3.0 * viscosity * rise * time / height**3  # suction is this times a² - r²
+        share = sucked * radius**2 / vacuum
+
+        def even(u, share=share):
+            return 1.0 - u + u * math.log(u) - 1.0 / share
+
+        least = radius * math.sqrt(brentq(even, 1e-12, 1.0)) if share > 1.0 else 0.0
+        if edge > least:
+            slope = (vacuum - sucked * (radius**2 - edge**2)) / math.log(radius / edge)
+            inwards = slope / edge + 2.0 * sucked * edge  # of the suction; it drives liquid in
+            edge -= step * height**2 / (12.0 * viscosity) * max(inwards, 0.0)
+        edge = max(edge, least, 1e-4 * radius)
+        slope = (vacuum - sucked * (radius**2 - edge**2)) / math.log(radius / edge)
+        r = np.linspace(edge, radius, 60)
+        suction = sucked * (radius**2 - r**2) + slope * np.log(radius / r)
+        if edge <= 1e-4 * radius:
+            suction = sucked * (radius**2 - r**2)
+        force = math.pi * edge**2 * vacuum + trapezoid(suction * 2.0 * math.pi * r, r)
+        impulse += force * step
+    share = impulse / (scene.expected_load * scene.gait.stance)
+    assert share <= bound(scene, 'suction') < 1.06 * share
 
 
 def test_bounds_of_the_film():
