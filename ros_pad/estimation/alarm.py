@@ -89,6 +89,7 @@ class Slip:
         sheared = fx * self.softness, fy * self.softness
         self._x, self._y = sheared if self._joints else (x, y)
         self.alarm.displacement = 0.0
+        self.sd = math.hypot(self.noise, math.sqrt(sample.variance))
         return x, y
 
     def update(

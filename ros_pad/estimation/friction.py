@@ -36,11 +36,12 @@ SLIP_SPEED = 0.04
 v. This density is zero at zero speed, so that the noise of a foot at rest does not count as slip.
 """
 
-# The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
+# The speed at which feet turn over its median, the square of a normal number, in eight parts, each
+# represented by its middle: feet of one robot hardly turn, those of another do all the time.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
-_HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
+_TURNING = (special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES) / special.erfinv(0.5)) ** 2
 
-SLOWEST = 0.1
+SLOWEST = 0.2
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
 only by the speed at which they turn, which is not known and the same all through a stance."""
 
@@ -49,13 +50,8 @@ CREEP, CREEP_SPEED, LEAST_PULL = 0.01, 0.025, 0.04
 over T/N, m/s, and what is added to T/N; the density is assumed exponential. Without creep, ground
 that holds more than any gait demands would be taken for ground that slips at that demand."""
 
-TEMPER = 0.5
-"""Weight of a sample: successive samples are not independent."""
-
-MODEL_ERROR, MODEL_SQUARE = 0.01, 0.08
-"""Error of friction measured in slip, mean over a walk: the first, and the second times the square
-of friction. A window may contain some stick, and feet turn more or less than assumed; the more
-they hold, the slower they slip, and the more turning hides."""
+MODEL_ERROR = 0.01
+"""Error of friction measured in slip, mean over a walk: a window may contain some stick."""
 
 
 class Evidence(NamedTuple):
@@ -122,8 +118,8 @@ class GroundModel:
     patch_length : float
         Distance over which wet and dry ground are assumed to change, m, above 0.
     rim_speed : float
-        Root mean square of the speed with which feet scrub as they turn about the vertical, m/s,
-        0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while
+        Median of the speed with which feet scrub as they turn about the vertical, m/s, 0 or more:
+        2/3 of the sole's radius times the turning rate. A foot that slips at v while
         its rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe
         and Cutkosky 1996); s is not measured.
     """
@@ -138,9 +134,9 @@ class GroundModel:
         self.shared = shared
         self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self.patch_length, self.rim_speed = patch_length, rim_speed
-        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
-        error = np.hypot(MODEL_ERROR, MODEL_SQUARE * GRID * GRID)
-        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
+        self._rim_speeds = rim_speed * _TURNING[:, None]
+        away = (GRID[:, None] - GRID) / MODEL_ERROR
+        blur = np.exp(-0.5 * away * away) * np.diff(EDGES)[:, None]
         blur = (blur / blur.sum(axis=0)).T
         # From a posterior to sums of the blurred one up to each edge, and to its moments.
         self.summary = np.column_stack((
@@ -296,7 +292,7 @@ class GroundFilter:
         evidence = self.model.likelihood(sample, rest, slip)
         evidence += 1e-6
         np.log(evidence, out=evidence)
-        evidence *= sample.weight * TEMPER
+        evidence *= sample.weight
         self._multiply(evidence, shown)
         if sample.speed > 0.0:
             self._move(sample.speed * sample.dt)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ros_pad.configuration import shown
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import doubt
+from ros_pad.estimation import alarm, doubt
 from ros_pad.estimation.alarm import BODY_CORRELATION, Slip
 from ros_pad.estimation.axes import BLOCK, Axes, Vector
 from ros_pad.estimation.doubt import Doubt
@@ -271,7 +271,8 @@ class Track:
         axes = Axes(load, self.slip.softness, BODY_CORRELATION if joints else BLOCK)
         self.watch = Watch(marker, tuning.force_noise, load, axes, joints)
         self._offset, self._heights = Offset(load), Heights()
-        self._window, self.time, self.stands = Window(0.0), -math.inf, False
+        self._window, self._touched = Window(0.0), -math.inf
+        self.time, self.stands = -math.inf, False
         self.sound, self.fresh = True, True
         self.last: Standing | None = Standing()
         self.slip.set_noise(marker, tuning.force_noise)
@@ -322,19 +323,17 @@ class Track:
         self.sound = True
         if not stood or dt > LONGEST_GAP:
             self._touch_down(time, sample, force, pressure)
-        if known:
+        if known and time - self._touched > alarm.SMOOTHING - 1e-9:
             self._stand(time, sample, force, pressure)
             return
-        # While the motion of the body is in doubt, there is no alarm, and nothing is learnt.
-        peak = self._window.peak
-        self._window = Window(time)
-        self._stand(time, sample, force, pressure)
-        self._window = Window(time, True, peak)
-        self.slip.alarm.displacement = 0.0
-        assert self.last
-        self.last = self.last._replace(slip_speed=0.0, turning=0.0, slipping=False)
-        self.fresh |= not stood or self.ground.doubt.code != doubt.MOTION
-        self.ground.doubt = Doubt(doubt.MOTION)
+        # While the foot lands, or the motion of the body is in doubt, there is no alarm, and
+        # nothing is learnt.
+        self._window = Window(time, True, self._window.peak)
+        self.slip.touch_down(sample, force[0], force[1])
+        self.last, self.time = Standing(0.0, *force), time
+        if not known:
+            self.fresh |= not stood or self.ground.doubt.code != doubt.MOTION
+            self.ground.doubt = Doubt(doubt.MOTION)
 
     def _set_back(self) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
@@ -359,7 +358,7 @@ class Track:
         self._heights.base = sample.z
         x, y = self.slip.touch_down(sample, force[0], force[1])
         self.ground.touch_down(time, x, y, pressure)
-        self._window = Window(time)
+        self._window, self._touched = Window(time), time
 
     def _lose(self, time: float, why: Doubt) -> None:
         """Use no sample, because the sensors are in doubt."""

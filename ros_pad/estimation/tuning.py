@@ -59,8 +59,8 @@ class Tuning:
         1.5, 'Distance over which wet and dry ground change.', 'm', 0.01, 100.0)
     wet_prior: float = _field(0.5, 'Prior probability of wet ground.', '', 0.01, 0.99)
     turning_rate: float = _field(
-        4.0, 'Root mean square of the rate at which a standing foot turns about the vertical; for'
-        ' legs without an ankle, the speed of the body over the length of the leg.',
+        4.0, 'Median rate at which a standing foot turns about the vertical; for legs without an'
+        ' ankle, the speed of the body over the length of the leg.',
         'rad/s', 0.0, 100.0)
     alarm_distance: float = _field(
         5e-4, 'Distance by which a contact has slipped when the alarm is raised.',

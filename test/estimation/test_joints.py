@@ -51,15 +51,15 @@ def test_the_alarm_waits_longer_where_the_velocity_is_less_certain():
     for sd, speed in [(0.005, 0.06), (0.01, 0.06), (0.02, 0.1)]:
         faster = speed - 3.0 * math.hypot(sd, 0.002)
         count = Stance(sd, dataclasses.replace(JOINTS, pads_shear=False)).slide(speed, 300)
-        # The first sample begins a stance, and counts for 2 ms.
-        assert count == 1 + math.ceil((5e-4 / faster - 0.002) / PERIOD)
+        # The five samples of the first 20 ms do not count.
+        assert count == 5 + math.ceil(5e-4 / faster / PERIOD)
     assert Stance(0.02).slide(0.05, 100) is None
 
 
 def test_an_uncertain_velocity_teaches_less():
     def wetness(sd):
         stance = Stance(sd)
-        for _ in range(100):
+        for _ in range(150):
             stance.sample(0.12, 0.05)
         return stance.estimates[-1].wet_probability
 

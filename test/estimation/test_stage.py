@@ -65,10 +65,10 @@ def test_pressures_that_are_no_number_or_too_large_leave_the_last_one():
 @pytest.mark.parametrize('moments', [False, True])
 def test_moments_count_where_they_are_measured(moments):
     watched = Watched(moments)
-    for ms in (4, 8):
+    for ms in (4, 14, 26):
         watched.sample(ms, moment=0.25)
     assert (watched.track.last.turning > 0.0) == moments
-    watched.sample(12, moment=1e6)
+    watched.sample(30, moment=1e6)
     assert len(watched.rejected) == moments
 
 
