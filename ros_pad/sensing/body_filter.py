@@ -166,7 +166,7 @@ class BodyFilter:
         legs = np.arange(len(places))
         spread.reshape(len(legs), 3, len(legs), 3)[legs, :, legs] += noise
         miss = (places - self.footholds).ravel()
-        moved = np.zeros_like(free)
+        moved = np.zeros(free.shape, dtype=bool)
         root, _ = dpotrf(spread, lower=1)
         score, _ = dtrtrs(root, miss, lower=1)
         if score @ score > self._gate:

@@ -44,8 +44,8 @@ TOO_FAST = 4.0
 # What a body shakes between samples, which the accelerometer shows in part, m/s².
 SHAKES = 0.1
 
-# Error of the place of a foot by the kinematics, each component, m.
-KINEMATICS = 5e-4
+# Variance of the place of a foot by the kinematics, m²: 0.5 mm in each component.
+KINEMATICS = 5e-4**2 * np.eye(3)
 
 # Deviation of the rotation after a time without readings of the IMU, rad.
 BLIND_TURN = 0.1
@@ -53,6 +53,7 @@ BLIND_TURN = 0.1
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
 
 _ROLLS = np.array(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))  # w @ _ROLLS = w x z
+_LEVEL = np.array((True, True, False))
 
 
 def forces_of(chains: Chains, kinematics: Kinematics, efforts: Array, gravity: Array) -> Array:
@@ -298,11 +299,11 @@ class BodyEstimator:
         time, gyro, _, kinematics, dq, forces = sample
         body, feet = self._filter, self._feet
         lands = self._load(sample)
-        free = np.repeat(~feet.standing | lands | self._checks.legs.against, 3).reshape(-1, 3)
-        free[:, :2] |= feet.excluded[:, None]
+        moves = ~feet.standing | lands | self._checks.legs.against
+        free = moves[:, None] | feet.excluded[:, None] & _LEVEL
         lines = body.turn @ kinematics.jacobians
         squares = lines @ lines.transpose(0, 2, 1)
-        noise = self._given.encoder_noise**2 * squares + KINEMATICS**2 * np.eye(3)
+        noise = self._given.encoder_noise**2 * squares + KINEMATICS
         moved = body.stand(kinematics.positions @ body.turn.T, noise, free)
         if not body.sound():
             # Begin anew after readings that no robot can have made.
@@ -419,10 +420,11 @@ class BodyEstimator:
         state = self._feet
         flags = state.standing.tolist(), state.slip.copy(), deviations.tolist()
         feet = tuple(map(FootMotion, centres, velocities, loads, *flags, state.excluded.tolist()))
-        velocity = body.velocity + turn @ cross(rate, self._body.to_imu[:3, 3])
+        axes = skew(arm)
+        velocity = body.velocity - axes @ (turn @ rate)
         # From the filter's errors to those of the base: rotation moves it about the IMU.
         step = self._body.errors
-        step[:3, :3] = -skew(arm)
+        step[:3, :3] = -axes
         step[6:9, :3] = -skew(velocity)
         covariance = step @ body.covariance[:9, :9] @ step.T
         return BodyEstimate(
