@@ -28,7 +28,7 @@ from studies.sensing.methods import METHODS, Track, track_of
 from studies.sensing.walks import COURSES, RAMP, REST, Log, robot_of, walk
 
 CASES = ('dry', 'patches', 'ice', 'hexapod')
-FIRST_SEED = 111  # constants of the estimator were chosen on seeds below 102
+FIRST_SEED = 211  # constants of the estimator were chosen on seeds below 114
 
 UNKNOWN = 5e-3  # m/s, deviation of the slip of a method that has none
 STICKS = 0.005  # m/s

@@ -18,6 +18,7 @@ from ros_pad.estimation.alarm import SMOOTHING, SPEED_NOISE, SlipAlarm
 from ros_pad.estimation.foot import FootEstimator, Tuning
 from ros_pad.estimation.track import LOAD_GATE
 from ros_pad.pace import Progress
+from studies import slips
 from studies.work_precision.estimator.tally import (
     Row,
     Tally,
@@ -227,11 +228,12 @@ def detect(walk: Recording, make: Callable[[Settings], Update]) -> Flags:
 def compare(walks: Sequence[Recording], progress: Progress) -> list[Row]:
     """Measure each method with each of its thresholds on the same readings.
 
+    The intervals of rows are of what a method misses more than the shipped one, the last.
     Progress, 0 to 1, is reported to ``progress``.
     """
     every = methods()
     times = {method.name: cost(walks[0], method.make) for method in every}
-    rows = []
+    rows, alarms = [], []
     for done, method in enumerate(every):
         tally = Tally()
         for walk in walks:
@@ -248,7 +250,11 @@ def compare(walks: Sequence[Recording], progress: Progress) -> list[Row]:
                 shipped=method.name == SHIPPED,
             )
         )  # fmt: skip
+        alarms.append(tally.alarms)
         progress((done + 1) / len(every))
+    for row, mine in zip(rows, alarms, strict=True):
+        ends = slips.differences(mine, alarms[-1], slips.SIZES[1]).tolist()
+        row.intervals.update(zip(('misses more', 'false more'), ends, strict=True))
     return rows
 
 
