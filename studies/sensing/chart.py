@@ -11,18 +11,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, STYLE, VERMILION
 from studies.sensing.stability import AFTER, LIMIT, LONGEST, RATES, TIMED, Curve
 
 COLOURS = {
     'estimator': BLUE,
     'no rejection': GREEN,
-    'invariant': PURPLE,
-    'invariant, χ²': SKY,
+    'plain': VERMILION,
+    'invariant, χ²': PURPLE,
     'odometry': ORANGE,
 }
 FLIGHTS = 0.05, 0.4  # s, times in which a gait may have no foot on the ground
-MARKERS = {'dry': 'o', 'patches': 's', 'ice': '^', 'hexapod': 'D'}
+OTHERS = 'model of others, '
+MARKERS = {
+    **{'dry': 'o', 'patches': 's', 'ice': '^', 'hexapod': 'D'},
+    **{OTHERS + 'dry': 'v', OTHERS + 'patches': '<', OTHERS + 'ice': '>'},
+}
 
 
 def picture(rows: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> Figure:

@@ -7,13 +7,12 @@ from scipy import stats
 
 from ros_pad.simulation import Scene
 from studies.work_precision.estimator import priors
-from studies.work_precision.estimator.priors import Condition, Sample
+from studies.work_precision.estimator.priors import End, Floor
 
 
 class Normal:
     """A posterior that is normal, of friction 0.5 with a deviation of 0.1."""
 
-    friction = 0.5, 0.1
     wet_probability = 0.2
 
     def quantile(self, shares):
@@ -27,38 +26,49 @@ def test_the_score_is_that_of_a_normal_distribution(away):
     density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
     below = 0.5 * (1.0 + math.erf(z / math.sqrt(2.0)))
     expected = 0.1 * (z * (2.0 * below - 1.0) + 2.0 * density - 1.0 / math.sqrt(math.pi))
-    sample = priors._sample(Normal(), 1.0, 1, 0, 0.5 + away)
-    assert sample.crps == pytest.approx(expected, abs=0.02 * 0.1)
-    assert sample.covered == (away < 0.196)
-    assert sample.width == pytest.approx(2.0 * 1.96 * 0.1, rel=1e-3)
-    assert not sample.below
-    assert priors._sample(Normal(), 1.0, 1, 0, 0.5 - 0.17).below
+    end = priors.scored(Normal(), True, 0.5 + away)
+    assert end.crps == pytest.approx(expected, abs=0.02 * 0.1)
+    assert end.less == pytest.approx(below, abs=0.011)
+    assert (end.wet, end.wet_probability, end.above) == (True, 0.2, False)
+    assert priors.scored(Normal(), True, 0.5 - 0.17).above
 
 
-def test_rows_count_time_and_stances():
-    """A stance of one sample counts by stance as much as one of nine."""
-    covered = [Sample(130.0 + 0.1 * k, 1, 0, 0.1, True, False, 0.2, 0.01) for k in range(9)]
-    missed = [Sample(140.0, 2, 0, 0.9, False, True, 0.2, 0.05)]
-    early = [Sample(10.0, 3, 1, 0.9, True, False, 0.4, 0.02)]
-    walk = {name: [] for name in priors.FILTERS} | {priors.LEARNS: early + covered + missed}
-    first, _, second, both = priors.rows_of(Condition('any'), [walk])
-    assert (first['phase'], first['ground'], first['samples']) == ('early', 'wet', 1)
-    assert (second['phase'], second['ground'], second['stances']) == ('late', 'dry', 2)
-    assert second['coverage'] == 0.9 and second['stance_coverage'] == 0.5
-    assert second['right_coverage'] == 1.0
-    assert second['below'] == 0.1 and second['wrong_labels'] == 0.5
-    assert second['crps'] == pytest.approx((9 * 0.01 + 0.05) / 10, abs=1e-4)
-    assert (both['ground'], both['coverage']) == ('all', 0.9)
+def test_rows_count_stances():
+    walk = [End(False, 0.1 * k, k == 2, 0.1 * k + 0.05, 0.1) for k in range(10)]
+    walk += [End(True, 0.95, False, 0.05, 0.6)]
+    row = priors.row_of({}, [walk, walk[:1]])
+    assert (row['walks'], row['stances'], row['above']) == (2, 12, round(1 / 12, 3))
+    assert row['crps'] == pytest.approx((11 * 0.1 + 0.6) / 12, abs=1e-4)
+    assert row['pit'] == [3, *[1] * 9]
+    assert row['right'] == round((7 + 1) / 12, 3)  # P(wet) is above 0.5 for 0.6 to 0.9, all dry
+    assert row['wet'][-1] == [2, 0.925, 0.5]
+    least, most = row['interval']
+    assert 0.0 <= least < 1 / 12 < most <= 1 / 11 + 1e-3
 
 
-def test_the_foot_of_a_walk_has_the_friction_of_its_condition():
+def test_floors_of_a_kind_are_in_two_rows():
+    """That of the robot, policy and floor, and that of all."""
+    flat, drawn = Floor('right'), Floor(priors.DRAWN)
+    walk = {name: [End(True, 0.9, False, 0.5, 0.1)] for name in priors.FILTERS}
+    rows = priors.rows_of([(flat, 'flat', 1), (flat, 'flat', 2), (drawn, 'dome', 1)], 3 * [walk])
+    found = [(row['floor'], row['robot'], row['policy'], row['walks']) for row in rows[:3]]
+    assert found == [
+        (priors.ALL, '', '', 2), ('right', 'hexapod', 'flat', 2), (priors.DRAWN, '', '', 1),
+    ]  # fmt: skip
+    assert len(rows) == 3 * len(priors.FILTERS)
+
+
+def test_the_foot_of_a_walk_has_the_friction_of_its_floor():
     """Wet friction halved is half of 0.12, and the friction that is configured is the file's."""
-    ground = Condition('', wet=0.5, spread=0.0)
-    walk = priors.walked(ground, 'flat', 50, duration=2)
+    floor = Floor('', wet=0.5, spread=0.0)
+    walk = priors.walked(floor, 'flat', 50, duration=2)
     light = (walk.load > 2.0) & walk.wet
     assert light.sum() > 100
     assert np.median(walk.grip[light] / walk.load[light]) == pytest.approx(0.06, abs=1e-6)
-    assert walk.settings[0].friction == Scene.load(ground.scene).foot.friction
+    assert walk.settings[0].friction == Scene.load(floor.scene).foot.friction
+    shipped, prior = zip(*priors.ends(walk, True), strict=True)
+    assert len(shipped) > 3
+    assert {end.wet_probability for end in prior} == {0.5}
 
 
 def test_floors_are_drawn_from_what_the_estimator_expects_before_a_walk():
