@@ -356,9 +356,9 @@ class BodyEstimator:
         """Update which feet are excluded; ``speeds`` of slip are in standard deviations."""
         if not self._given.rejection:
             return
-        feet = self._feet
-        fresh = feet.standing & ~feet.excluded & (moved | (speeds > TOO_FAST))
-        slow = feet.standing & ~fresh & (speeds < 2.5)
+        feet, fast = self._feet, speeds > TOO_FAST
+        fresh = feet.standing & ~feet.excluded & (moved | fast)
+        slow = feet.standing & ~(fresh | fast)
         feet.slow_since = np.where(slow, np.minimum(feet.slow_since, time), math.inf)
         feet.excluded |= fresh
         sticks = time - feet.slow_since >= PATIENCE

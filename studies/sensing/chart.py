@@ -13,6 +13,7 @@ from matplotlib.ticker import LogLocator
 
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, STYLE, VERMILION
 from studies.sensing.stability import AFTER, LIMIT, LONGEST, RATES, TIMED, Curve
+from studies.sensing.walks import RECORDED
 
 COLOURS = {
     'estimator': BLUE,
@@ -25,6 +26,7 @@ FLIGHTS = 0.05, 0.4  # s, times in which a gait may have no foot on the ground
 OTHERS = 'model of others, '
 MARKERS = {
     **{'dry': 'o', 'patches': 's', 'ice': '^', 'hexapod': 'D'},
+    RECORDED: 'P',
     **{OTHERS + 'dry': 'v', OTHERS + 'patches': '<', OTHERS + 'ice': '>'},
 }
 

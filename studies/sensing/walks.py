@@ -57,6 +57,7 @@ DRIVES = {
     'go2_sim': Drive(0.3, 80.0, 3.0, 45.0, 0.01),
 }
 REFERENCE = pathlib.Path(__file__).resolve().parents[2] / 'test' / 'reference'
+RECORDED = 'independent walk'
 REFERENCE_LEGS = ('FL', 'FR', 'RL', 'RR')
 
 
@@ -69,7 +70,7 @@ class Course:
     robot : str
         ``go2`` or ``ch3r``, or ``go2_sim``: the model of the independent walk in test/reference.
     floor : str
-        ``dry``, ``patches`` or ``ice``.
+        ``dry``, ``patches`` or ``ice``; ``recorded`` for the independent walk itself, 20 s.
     push : float
         Length of a push of the trunk, s.
     rate : float
@@ -129,6 +130,34 @@ def foreign(robot: Robot, drive: Drive) -> str:
     for index, leg in enumerate(REFERENCE_LEGS):
         text = text.replace(f'geom name="{leg}"', f'geom name="foot_{index}"')
     return re.sub('<actuator>.*</actuator>', f'<actuator>{servos}</actuator>', text)
+
+
+def recorded() -> Log:
+    """Return the independent walk in test/reference."""
+    data = np.load(REFERENCE / 'quad_dry.npz')
+    w, x, y, z = data['truth_base_quat_wxyz'].T
+    orientation = np.stack([x, y, z, w], axis=1)
+    turns = np.array([matrix(each) for each in orientation])
+    ahead = from_rpy((0.0, 0.0, np.arctan2(turns[0, 1, 0], turns[0, 0, 0])))
+
+    def of(name: str) -> Array:
+        return np.asarray(data[name], dtype=float)
+
+    return Log(
+        time=of('time'),
+        gyro=of('imu_gyro'),
+        accelerometer=of('imu_acc'),
+        joint_positions=of('joint_pos'),
+        joint_velocities=of('joint_vel'),
+        foot_forces=of('foot_force_world') @ turns,
+        efforts=np.full_like(of('joint_pos'), np.nan),
+        position=of('truth_base_pos') @ ahead,
+        orientation=orientation,
+        velocity=of('truth_base_vel_world') @ ahead,
+        feet=of('truth_foot_pos') @ ahead,
+        slip=(of('truth_contact_vel') @ ahead)[..., :2],
+        load=of('truth_force_world')[..., 2],
+    )
 
 
 def model_of(robot: Robot, course: Course) -> str:
@@ -238,7 +267,7 @@ class _Pushes:
 
 
 def walk(course: Course, seed: int, duration: float) -> Log:
-    """Simulate a walk of a shipped robot with pushes of the trunk.
+    """Simulate a walk of a robot with pushes of the trunk, or read the independent one.
 
     Parameters
     ----------
@@ -251,6 +280,8 @@ def walk(course: Course, seed: int, duration: float) -> Log:
     """
     import mujoco
 
+    if course.floor == 'recorded':
+        return recorded()
     robot, drive = robot_of(course.robot), DRIVES[course.robot]
     gait = robot.gait
     assert gait is not None
@@ -388,6 +419,7 @@ COURSES = {
     'ice': Course(floor='ice'),
     'hexapod': Course('ch3r', 'patches'),
     'long pushes, ice': Course(floor='ice', push=0.6),
+    RECORDED: Course('go2_sim', 'recorded'),
     'model of others, dry': Course('go2_sim'),
     'model of others, patches': Course('go2_sim', 'patches'),
     'model of others, ice': Course('go2_sim', 'ice'),
