@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure how well force, moment and foot IMU detect slip on labelled contacts of other robots.
+"""Measure how well force and angular rate detect slip on labelled contacts of other robots.
 
 The files are those of https://github.com/mrsp/lcd, folder ``data`` (MIT;
 https://ieeexplore.ieee.org/document/9981354): 13 columns at 100 Hz without a header: force x, y,
@@ -24,13 +24,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ros_pad.contact.resistance import Foot, expected_friction
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import Tuning
-from ros_pad.estimation.alarm import SLOWEST_SLIP, SURE, SlipAlarm
-from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
-from ros_pad.estimation.ground import RATIO_NOISE
-from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.track import LOAD_GATE
 from studies import command
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
@@ -60,11 +54,8 @@ SAME = 0.02
 FEWEST = 10
 """Smallest number of slips for which a share is given."""
 
-RATIO, TWIST, RATE, CUSUM, SHAKE = (
-    'T/N', 'T/N with M_z', 'rate', 'CUSUM of rim speed', 'acceleration',
-)  # fmt: skip
-RANKED = (RATIO, TWIST, RATE, CUSUM, SHAKE)
-ALARMED = (RATIO, RATE, CUSUM, SHAKE)
+FEATURES = ('T/N', 'rate')
+"""What may show slip, by sample: T/N, and the angular rate."""
 
 
 # --- recordings ----------------------------------------------------------------------------------
@@ -78,16 +69,14 @@ class Recording:
     ----------
     name : str
         Name of the file without its ending.
-    force, moment, acceleration, rate : ndarray, shape (n, 3)
-        N, N m, m/s², rad/s.
+    force, rate : ndarray, shape (n, 3)
+        N and rad/s.
     label : ndarray of int, shape (n,)
         ``STABLE``, ``NONE`` or ``SLIP``.
     """
 
     name: str
     force: np.ndarray
-    moment: np.ndarray
-    acceleration: np.ndarray
     rate: np.ndarray
     label: np.ndarray
 
@@ -153,30 +142,6 @@ class Recording:
         return found
 
     @functools.cached_property
-    def centre(self) -> np.ndarray:
-        """Centre of pressure, shape (n, 2), m, assuming that forces are measured at sole level."""
-        return np.column_stack(
-            [self.per_load(-self.moment[:, 1]), self.per_load(self.moment[:, 0])]
-        )
-
-    @functools.cached_property
-    def torsion(self) -> np.ndarray:
-        """Moment about the vertical through the centre of pressure, over the load, m."""
-        x, y = self.centre.T
-        return self.per_load(self.moment[:, 2] - x * self.force[:, 1] + y * self.force[:, 0])
-
-    @functools.cached_property
-    def sole_radius(self) -> float:
-        """Radius of a disc that stands for the sole, which the files do not contain, m.
-
-        Its area is that of the rectangle between the 1 % and 99 % quantiles of the centre of
-        pressure above half of the expected load.
-        """
-        loaded = self.centre[self.load > 0.5 * self.expected_load]
-        low, high = np.quantile(loaded, [0.01, 0.99], axis=0)
-        return math.sqrt(float(np.prod(high - low)) / math.pi)
-
-    @functools.cached_property
     def quiet(self) -> np.ndarray:
         """Whether each sample is stable, in stance, and :data:`CLEAR` away from labelled slips."""
         reach = round(CLEAR / PERIOD)
@@ -199,10 +164,6 @@ class Recording:
     def speed(self) -> np.ndarray:
         """Magnitude of the angular rate, rad/s."""
         return np.linalg.norm(self.rate, axis=1)
-
-    def usual(self, value: np.ndarray) -> float:
-        """Return the median of a value at more than half of the expected load; no label needed."""
-        return float(np.median(value[self.load > 0.5 * self.expected_load]))
 
 
 def read(path: pathlib.Path) -> Recording:
@@ -227,8 +188,7 @@ def read(path: pathlib.Path) -> Recording:
             f'{path}: 13 columns of finite numbers are needed, the last one (labels'
             f' {np.unique(table[:, 12])}) 0, 1 or 2'
         )
-    force, moment, acceleration, rate = np.split(table[:, :12], 4, axis=1)
-    found = Recording(path.stem, force, moment, acceleration, rate, table[:, 12].astype(int))
+    found = Recording(path.stem, table[:, :3], table[:, 9:12], table[:, 12].astype(int))
     if not (np.any(found.load > 0.0) and found.slipping.any() and found.sticking.any()):
         raise InvalidInput(
             f'{path} has no stable contact or no slip in stance (force z above {GATE:g} of the'
@@ -242,55 +202,7 @@ def read(path: pathlib.Path) -> Recording:
 
 def features(recording: Recording) -> dict[str, np.ndarray]:
     """Return each feature by sample; a larger value makes slip more likely."""
-    lever = 2.0 / 3.0 * recording.sole_radius
-    return {
-        RATIO: recording.ratio,
-        # The ellipsoidal limit surface with the torsional limit 2/3 R μ N of a disc.
-        TWIST: np.hypot(recording.ratio, 1.5 * recording.torsion / recording.sole_radius),
-        RATE: recording.speed,
-        CUSUM: cusum(recording, lever * recording.speed),
-        SHAKE: np.linalg.norm(recording.acceleration, axis=1),
-    }
-
-
-def cusum(recording: Recording, speed: np.ndarray) -> np.ndarray:
-    """Return the displacement, m, of ros_pad's slip alarm for a speed, m/s.
-
-    The noise is the speed of the quiet foot. Nothing else is fitted to the robot.
-    """
-    allowed = max(SLOWEST_SLIP, SURE * recording.usual(speed))
-    statistic = np.zeros(len(speed))
-    for start, stop in recording.stances:
-        alarm = SlipAlarm()
-        for index in range(start, stop):
-            alarm.update(float(speed[index]), allowed, math.inf, PERIOD)
-            statistic[index] = alarm.displacement
-    return statistic
-
-
-def least_friction(recording: Recording) -> np.ndarray:
-    """Return the 5 % quantile of friction that GroundFilter estimates without a position.
-
-    The slip speed is not measured: the filter gets zero with a standard deviation of 1 m/s. Each
-    stance is on new ground, and T/N that does not change has no weight, as in FootEstimator.
-    """
-    prior = expected_friction(Foot.load('large37'), 6.8)
-    ground = GroundFilter(GroundModel(FrictionScales(prior, learns=False)))
-    noise = RATIO_NOISE
-    window = round(Tuning().filter_period / PERIOD)
-    quantile = np.zeros(len(recording.label))
-    for start, stop in recording.stances:
-        ground.touch_down(math.inf, dome=False)
-        last = math.inf
-        for first in range(start, stop, window):
-            end = min(first + window, stop)
-            ratio = float(recording.ratio[first:end].mean())
-            weight = -math.expm1(-0.5 * ((ratio - last) / noise) ** 2)
-            last = ratio if math.isinf(last) else last + weight * (ratio - last)
-            duration = (end - first) * PERIOD
-            ground.update(Evidence(ratio, noise, 0.0, 1.0, duration, weight))
-            quantile[first:end] = ground.quantile(0.05)
-    return quantile
+    return dict(zip(FEATURES, (recording.ratio, recording.speed), strict=True))
 
 
 # --- ranking -------------------------------------------------------------------------------------
@@ -331,14 +243,14 @@ def measure(recordings: Sequence[Recording]) -> dict[str, Any]:
         own = scores[each.name]
         others = [other for other in recordings if other.robot != each.robot]
         alarms: dict[str, Any] = {}
-        for name in ALARMED:
+        for name in FEATURES:
             for word, teachers in (('own', [each]), ('other', others)):
                 taught = [scores[other.name][name] for other in teachers]
                 threshold = operating_threshold(taught, teachers)
                 alarms.setdefault(name, {})[word] = alarm_figures(own[name], threshold, each)
         found[each.name] = {
             'labels': labels(each),
-            'ranking': {name: ranking(own[name], each) for name in RANKED},
+            'ranking': {name: ranking(own[name], each) for name in FEATURES},
             'alarm': alarms,
         }
     return {
@@ -347,17 +259,13 @@ def measure(recordings: Sequence[Recording]) -> dict[str, Any]:
 
 
 def labels(recording: Recording) -> dict[str, Any]:
-    """Return how many labels there are, and how the friction of the floor is estimated."""
-    ends = [stop - 1 for _, stop in recording.stances]
-    one = recording.floors[0] if len(recording.floors) == 1 else None
-    below = None if one is None else float(np.mean(least_friction(recording)[ends] > one))
+    """Return how many labels there are, and the friction of the floors."""
     return {
         'samples': len(recording.label),
         'stances': len(recording.stances),
         'slips': int(recording.slipping.sum()),
         'expected_load_N': recording.expected_load,
         'floors': recording.floors,
-        'friction_below_quantile': below,
     }
 
 
@@ -438,19 +346,21 @@ def draw(recordings: Sequence[Recording], document: dict[str, Any]) -> Figure:
 
 def _draw_ranking(panel: Axes, rows: dict[str, Any], colours: dict[str, str]) -> None:
     for number, (name, row) in enumerate(rows.items()):
-        places = np.arange(len(RANKED)) + 0.15 * (number - 0.5 * (len(rows) - 1))
-        found = [row['ranking'][each] for each in RANKED]
+        places = np.arange(len(FEATURES)) + 0.15 * (number - 0.5 * (len(rows) - 1))
+        found = [row['ranking'][each] for each in FEATURES]
         ends = np.array([each['interval'] for each in found]).T
         panel.hlines(places, *ends, color=colours[name], lw=1.4)
         values = [each['auc'] for each in found]
         label = name.replace('_', ' ')
         panel.plot(values, places, 'o', ms=4.0, color=colours[name], label=label)
     panel.axvline(0.5, color=BLACK, lw=0.9, ls='--')
-    panel.set_yticks(range(len(RANKED)), RANKED)
+    panel.set_yticks(range(len(FEATURES)), FEATURES)
     panel.set(
-        ylim=(len(RANKED) - 0.5, -0.5), xlim=(0.1, 1.02), xlabel='AUC of labelled slip, in stance',
+        ylim=(len(FEATURES) - 0.5, -0.5),
+        xlim=(0.1, 1.02),
+        xlabel='AUC of labelled slip, in stance',
         title='a  slip ranked above stable contact',
-    )  # fmt: skip
+    )
     panel.legend(fontsize=7.5, loc='lower left')
 
 
