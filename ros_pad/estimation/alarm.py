@@ -25,8 +25,8 @@ which is common to all feet, lasts for about a stance."""
 SLOWEST_SLIP = 0.01
 """Speed up to which a contact may move without an alarm, m/s: feet roll and bend."""
 
-SURE = 3.0
-"""Standard deviations of a measured velocity, or of a place, that are no slip."""
+SURE_SPEED, SURE_PLACE = 2.0, 3.0
+"""Standard deviations of a measured velocity, and of a place, that are no slip."""
 
 
 class SlipAlarm:
@@ -119,6 +119,6 @@ class Slip:
         # A foot gives way against its tangential force; the rest of its speed is only noise.
         speed = -along / pull if pull > 0.0 else 0.0
         # Errors of a velocity last, those of a place do not.
-        allowed = max(SLOWEST_SLIP, SURE * self.sd if self._joints else 0.0)
-        distance = max(self._distance, SURE * self.contact_noise)
+        allowed = max(SLOWEST_SLIP, SURE_SPEED * self.sd if self._joints else 0.0)
+        distance = max(self._distance, SURE_PLACE * self.contact_noise)
         return speed, self.alarm.update(speed, allowed, distance, dt), (x, y)

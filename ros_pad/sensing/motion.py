@@ -19,6 +19,9 @@ from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
 SMOOTHING = 0.01
 """Time constant of the slip velocity, s: as sluggish as a mean over twice that."""
 
+LANDING = 0.02
+"""Time from touch-down on in which the slip velocity is not smoothed, s: feet skid on landing."""
+
 Flags = npt.NDArray[np.bool_]
 
 
@@ -169,8 +172,8 @@ class Feet:
 
     def smooth(self, dt: float, slips: Array, lands: Flags) -> None:
         """Smooth the velocities of the contact points, (legs, 2), m/s, from touch-down on."""
-        self._age = np.where(lands, 0.0, self._age + dt)
-        share = dt / np.minimum(self._age + dt, SMOOTHING + dt) if dt else np.ones_like(self._age)
+        self._age = np.where(lands, -LANDING, self._age + dt)
+        share = dt / np.clip(self._age + dt, dt, SMOOTHING + dt) if dt else np.ones_like(self._age)
         self.slip += share[:, None] * (slips - self.slip)
         self.white = (1.0 - share) ** 2 * self.white + share**2
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.estimation.alarm import SLOWEST_SLIP, SURE, SlipAlarm
+from ros_pad.estimation.alarm import SLOWEST_SLIP, SMOOTHING, SURE_SPEED, SlipAlarm
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.robots.rotation import Array
 from ros_pad.sensing.motion import Feet
@@ -45,12 +45,13 @@ def alarms_of(track: Track, rate: float) -> Flags:
     tangential = track.force[..., :2]
     strength = np.maximum(np.linalg.norm(tangential, axis=2), 1e-9)
     speeds = -(track.slip * tangential).sum(2) / strength
-    allowed = np.maximum(SLOWEST_SLIP, SURE * np.nan_to_num(track.slip_deviation, nan=UNKNOWN))
+    deviations = np.nan_to_num(track.slip_deviation, nan=UNKNOWN)
+    allowed = np.maximum(SLOWEST_SLIP, SURE_SPEED * deviations)
     found = np.zeros(speeds.shape, dtype=bool)
     for leg in range(speeds.shape[1]):
         for start, stop in runs(track.standing[:, leg]):
             alarm = SlipAlarm()
-            for row in range(start, stop):
+            for row in range(start + round(SMOOTHING * rate), stop):  # it has landed
                 sample = float(speeds[row, leg]), float(allowed[row, leg])
                 found[row, leg] = alarm.update(*sample, Tuning.alarm_distance, 1.0 / rate)
     return found
