@@ -22,7 +22,7 @@ BODY_CORRELATION = 0.15
 """Time over which errors of a measured velocity of the contact are the same, s: that of the body,
 which is common to all feet, lasts for about a stance."""
 
-SLOWEST_SLIP = 0.01
+SLOWEST_SLIP = 0.015
 """Speed up to which a contact may move without an alarm, m/s: feet roll and bend."""
 
 SURE_SPEED, SURE_PLACE = 2.0, 3.0

@@ -32,7 +32,7 @@ from studies.work_precision.estimator.walks import Flags, Recording
 RATIO, CUSUM, SHIPPED = 'T/N', 'displacement', 'FootEstimator, alarm'
 LIKELIHOOD, GLR, STATES = 'CUSUM of likelihoods', 'GLR', 'two states'
 RATIOS = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.3, 0.4, 0.6)
-CUSUM_SPEEDS = (0.005, 0.01, 0.02)  # m/s
+CUSUM_SPEEDS = (0.01, 0.015, 0.02)  # m/s
 DISTANCES = (1e-4, 2e-4, 3.5e-4, 5e-4, 1e-3, 2e-3)  # m
 NATS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 ODDS = (0.0, 2.0, 4.0, 8.0, 16.0)  # logarithms

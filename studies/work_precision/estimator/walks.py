@@ -23,7 +23,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 CYCLES = 15
-SEEDS = (301, 302)  # the defaults of the estimator were chosen on other seeds
+SEEDS = (311, 312)  # the defaults of the estimator were chosen on other seeds
 FEW_CYCLES = 10
 ROBOTS, POLICIES = ('hexapod', 'quadruped'), ('flat', 'dome', 'adaptive')
 SETTLED = 1.0  # s: before, the robot only stands
