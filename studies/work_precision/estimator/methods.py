@@ -68,14 +68,14 @@ class SlipSpeed:
         foot, load, _ = settings
         self._gate, self._stiffness = LOAD_GATE * load, foot.shear_stiffness
         self._time: float | None = None
-        self._x = self._y = 0.0
+        self._touched = self._x = self._y = 0.0
 
     def update(
         self, time: float, force: Sequence[float], position: Sequence[float]
     ) -> tuple[float, float] | None:
         """Return slip speed, m/s, and time since the last sample, s.
 
-        None in the air, and for the first sample of a stance.
+        None in the air, and while the foot lands.
         """
         push_x, push_y, load = force
         if load < self._gate:
@@ -83,6 +83,8 @@ class SlipSpeed:
             return None
         x, y = position[0] + push_x / self._stiffness, position[1] + push_y / self._stiffness
         if self._time is None:
+            self._touched = time
+        if self._time is None or time - self._touched <= SMOOTHING - 1e-9:
             self._time, self._x, self._y = time, x, y
             return None
         dt, self._time = time - self._time, time
