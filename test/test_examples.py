@@ -146,10 +146,10 @@ def test_slip_from_csv(run):
         assert wet > 0.5 or (begin < 1.44 and 'not pulled' in line)
     for number, slip in enumerate(slips):
         # Net motion of the contact after the landing of 20 ms, from five readings at either end.
-        # The alarm leaves out what is slower than 15 mm/s, and half a millimetre of the rest.
+        # The alarm leaves out what is slower than 15 mm/s, and each time half a millimetre more.
         stands = contact[:, (cycle == number) & (data['fz'] > 0.5)]
         net = 1e3 * np.hypot(*(stands[:, -5:].mean(axis=1) - stands[:, 5:10].mean(axis=1)))
-        assert slip == pytest.approx(net, rel=0.1, abs=2.0) if net > 5.0 else slip < 5.0
+        assert slip == pytest.approx(net, abs=2.5) if net > 5.0 else slip < 5.0
     assert np.count_nonzero(slips > 5.0) == 3
 
 
