@@ -32,7 +32,7 @@ from studies.closed_loop import loops
 from studies.samples import runs
 
 SCENES = ('hexapod_patches', 'quadruped_patches')
-FIRST_SEED = 401  # earlier ones were used while the code was written and mended
+FIRST_SEED = 431  # earlier ones were used while the code was written and mended
 GATE = 0.3
 """Share of the expected load above which a foot stands."""
 
