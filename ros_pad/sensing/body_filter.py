@@ -32,6 +32,10 @@ _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 _GYRO, _FORCE = slice(9, 12), slice(12, 15)
 FEET = 15
 
+# Jump of the accelerometer from which on it is an impact or a wrong reading, m/s², and the share of
+# the rest that is noise.
+IMPACT, DOUBTED = 5.0, 0.3
+
 # Random motion of feet that stand, m after 1 s, and what more soft feet rise and sink.
 STRAY, SINK = 2e-3, 6e-3
 
@@ -76,6 +80,7 @@ class BodyFilter:
         self.footholds = np.zeros((legs, 3))
         self.covariance = np.zeros((size, size))
         self._noise, self._gate = np.array(3 * [gyro_noise] + 3 * [accelerometer_noise]), gate
+        self._force = np.full(3, math.nan)  # the last reading
         # What errors, and errors of gyro and accelerometer, do in a step of a length, s.
         self._step, self._inputs, self._dt = np.eye(size), np.zeros((size, 6)), 0.0
 
@@ -117,11 +122,12 @@ class BodyFilter:
         self.velocity = v + dt * acceleration
         self.position = self.position + dt * mean
         self.footholds += dt * (rolling - mean)
-        self._spread_on(dt, turn)
+        jump, self._force = force - self._force, force
+        self._spread_on(dt, turn, DOUBTED * max(0.0, math.sqrt(jump @ jump) - IMPACT))
         return mean
 
-    def _spread_on(self, dt: float, turn: Array) -> None:
-        """Advance the covariance."""
+    def _spread_on(self, dt: float, turn: Array, impact: float) -> None:
+        """Advance the covariance, with more noise of the accelerometer, m/s²."""
         step, inputs = self._step, self._inputs
         if dt != self._dt:
             self._dt = dt
@@ -135,6 +141,7 @@ class BodyFilter:
         step[_PLACE, _TURN] = -dt * lines[0]
         step[:9, 9:15], step[FEET:, 9:15] = inputs[:9], inputs[FEET:]
         noise = self._noise * inputs
+        noise[:, 3:] += impact * inputs[:, 3:]
         self.covariance[:] = step @ self.covariance @ step.T + noise @ noise.T
         variances = _diagonal(self.covariance)
         variances[_GYRO] += 2e-5**2 * dt  # drift of the biases after 1 s, rad/s and m/s²
