@@ -32,7 +32,7 @@ _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 _GYRO, _FORCE = slice(9, 12), slice(12, 15)
 FEET = 15
 
-# Jump of the accelerometer from which on it is an impact or a wrong reading, m/s², and the share of
+# Jump of the accelerometer above which it is an impact or a wrong reading, m/s², and share of
 # the rest that is noise.
 IMPACT, DOUBTED = 5.0, 0.3
 
