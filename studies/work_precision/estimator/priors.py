@@ -261,7 +261,7 @@ def draw(rows: Sequence[Row]) -> Figure:
     """Return the picture: quantile and score of each floor, P(wet) and PIT of all of them."""
     labels = list(dict.fromkeys(_label(row) for row in rows))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 0.25 * len(labels) + 1.2), layout='constrained')
+        figure = Figure(figsize=(12.0, 0.25 * len(labels) + 1.2), layout='constrained')
         share, score, wet, pit = figure.subplots(1, 4, width_ratios=(1.3, 1.0, 1.0, 1.0))
         share.axvspan(0.03, 0.08, color='0.9', lw=0, label='asked')
         for row in rows:
@@ -273,19 +273,25 @@ def draw(rows: Sequence[Row]) -> Figure:
             if row['floor'] in (ALL, DRAWN) and row['filter'] == LEARNS:
                 line = '-' if row['floor'] == ALL else '--'
                 _, said, true = np.array(row['wet']).T
-                wet.plot(said, true, line + 'o', color=colour, ms=3.5, label=row['floor'])
+                wet.plot(said, true, line + 'o', color=colour, ms=3.5)
                 shares = np.array(row['pit']) / row['stances']
-                pit.stairs(shares, np.linspace(0.0, 1.0, 11), color=colour, ls=line)
+                pit.stairs(
+                    shares, np.linspace(0.0, 1.0, 11), color=colour, ls=line, label=row['floor']
+                )
         wet.plot([0.0, 1.0], [0.0, 1.0], color='0.6', lw=0.8)
         pit.axhline(0.1, color='0.6', lw=0.8)
-        share.set(xlabel='5 % quantile above friction, share of stances', xlim=(0.0, None))
-        score.set(xlabel='CRPS, units of friction', xlim=(0.0, None), yticks=[])
-        wet.set(xlabel='P(wet)', ylabel='wet, share of stances')
-        pit.set(xlabel='P(less friction than the true one)', ylabel='share', ylim=(0.0, None))
+        share.set(xlabel='5 % quantile is above friction,\nshare of stances', xlim=(0.0, None))
+        score.set(xlabel='CRPS,\nunits of friction', xlim=(0.0, None), yticks=[])
+        wet.set(xlabel='P(wet)\n', ylabel='wet, share of stances')
+        pit.set(
+            xlabel='probability of less friction\nthan the true one',
+            ylabel='share of stances',
+            ylim=(0.0, 0.3),
+        )
         share.set_yticks(range(len(labels)), labels)
         for axes in (share, score):
             axes.set_ylim(len(labels) - 0.5, -0.5)
-        wet.legend(fontsize=7)
+        pit.legend(fontsize=8, loc='upper left')
         handles = [
             Line2D([], [], color=colour, marker=marker, ms=4.0, lw=0.9, label=name)
             for name, (colour, marker) in LOOKS.items()
