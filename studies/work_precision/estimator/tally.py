@@ -190,6 +190,8 @@ class Row:
     misses : float or None
         Share of slips of 5 mm that are missed.
     slips : int
+    others : dict of list of float
+        Share missed of slips of other sizes, with its 95 % interval.
     false_per_minute : float or None
         False alarms in a minute of stick.
     stick_minutes : float
@@ -221,6 +223,7 @@ class Row:
     delay: float | None
     misses: float | None
     slips: int
+    others: dict[str, list[float | None]]
     false_per_minute: float | None
     stick_minutes: float
     us_per_update: float | None
@@ -245,6 +248,10 @@ def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Ro
         delay=found['latency_s'],
         misses=found['missed_5_mm'],
         slips=found['slips_5_mm'],
+        others={
+            f'{size} mm': [found[f'missed_{size}_mm'], *found[f'missed_{size}_mm_interval']]
+            for size in (3, 10)
+        },
         false_per_minute=found['false_alarms_a_minute'],
         stick_minutes=found['minutes_of_sticking'],
         us_per_update=us_per_update,
