@@ -27,7 +27,7 @@ _TARGET: dict[str, Any] = {'color': BLACK, 'lw': 0.9, 'ls': '--', 'zorder': 1.5}
 
 _LOOKS: dict[tuple[str, str], dict[str, Any]] = {
     (RATIO, ''): {'color': VERMILION, 'marker': 'X'},
-    (CUSUM, '5 mm/s'): {'color': SKY, 'marker': 'o'},
+    (CUSUM, '15 mm/s'): {'color': SKY, 'marker': 'o'},
     (CUSUM, '10 mm/s'): {'color': BLUE, 'marker': 'o'},
     (CUSUM, '20 mm/s'): {'color': BLUE, 'marker': 'o', 'mfc': 'white', 'ls': ':'},
     (LIKELIHOOD, ''): {'color': ORANGE, 'marker': 's'},
