@@ -34,7 +34,7 @@ from ros_pad.control import (
     footprints,
     policy_named,
 )
-from ros_pad.estimation import Tuning, alarm, friction, ground, track
+from ros_pad.estimation import Tuning, alarm, ground, track
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
@@ -53,7 +53,7 @@ FIXED = ('flat', 'dome')
 SHIPPED = 'as shipped'
 CONSTANTS = {
     'LOAD_GATE': track, 'SMOOTHING': alarm, 'SPEED_NOISE': alarm, 'RATIO_NOISE': ground,
-    'TEMPER': friction, 'WET_PRIOR': footprints, 'FADING_LENGTH': footprints, 'KEPT': footprints,
+    'WET_PRIOR': footprints, 'FADING_LENGTH': footprints, 'KEPT': footprints,
 }  # fmt: skip
 """Constants of estimator and controller that are made wrong, with the modules that hold them."""
 
@@ -194,7 +194,6 @@ ASSUMPTIONS = (
     Assumption('estimation/alarm.py: SPEED_NOISE',
                'constants.SPEED_NOISE', 'model error of slip speed', 'm/s'),
     Assumption(TUNING + 'turning_rate', 'tuning.turning_rate', 'turning rate of feet', 'rad/s'),
-    Assumption('estimation/friction.py: TEMPER', 'constants.TEMPER', 'temper', '', 'odds'),
     Assumption(CONTROL + 'margin', 'controller.margin', 'pressure margin', '', 'excess'),
     Assumption(CONTROL + 'lift_off_share',
                'controller.lift_off_share', 'load gate, controller', ''),
