@@ -150,10 +150,9 @@ CHANGES = (
 )  # fmt: skip
 
 
-TUNED, HELD_OUT = 'tuned on', 'held out'
-WALK_SEEDS = {TUNED: (31, 32, 33, 34), HELD_OUT: (341, 342, 343, 344, 345, 346)}
-"""Floors on which the settings of measured noise and of the doubt about axes were chosen, and
-others."""
+HELD_OUT = 'held out'
+WALK_SEEDS = (341, 342, 343, 344, 345, 346)
+"""Floors on which no setting was chosen."""
 
 WALK_CYCLES = 40
 
@@ -201,18 +200,17 @@ def noisy(walk: Recording, noise: Noise, generator: np.random.Generator) -> Reco
     )
 
 
-def walk_cases(count: int | None) -> list[tuple[str, str, int, str]]:
-    """Return robot, part of the floors, seed and policy of each walk; ``count`` floors or all."""
+def walk_cases(count: int | None) -> list[tuple[str, int, str]]:
+    """Return robot, seed and policy of each walk; on ``count`` floors, or on all."""
     return [
-        (robot, part, seed, policy)
-        for part, seeds in WALK_SEEDS.items()
+        (robot, seed, policy)
         for robot in (*ROBOTS, STICKS)
-        for seed in seeds[:count]
+        for seed in WALK_SEEDS[:count]
         for policy in (POLICIES if robot != STICKS else ('flat',))
     ]
 
 
-def tallies(robot: str, part: str, seed: int, policy: str) -> list[Tally]:
+def tallies(robot: str, seed: int, policy: str) -> list[Tally]:
     """Walk once, and return the counts with each of :data:`NOISE_CASES`."""
     name = 'hexapod_smooth_dry_flat' if robot == STICKS else f'{robot}_patches'
     scene = replace(Scene.load(name), cycles=WALK_CYCLES)
@@ -228,14 +226,14 @@ def tallies(robot: str, part: str, seed: int, policy: str) -> list[Tally]:
 
 
 def rows_by_walk(
-    cases: Sequence[tuple[str, str, int, str]], found: Sequence[Sequence[Tally]]
+    cases: Sequence[tuple[str, int, str]], found: Sequence[Sequence[Tally]]
 ) -> list[Row]:
-    """Return a row for each robot, part of the floors and noise, with intervals over walks."""
+    """Return a row for each robot and noise, with intervals over walks."""
     rows = []
-    for robot, part in dict.fromkeys(case[:2] for case in cases):
-        mine = [each for case, each in zip(cases, found, strict=True) if case[:2] == (robot, part)]
+    for robot in dict.fromkeys(case[0] for case in cases):
+        mine = [each for case, each in zip(cases, found, strict=True) if case[0] == robot]
         for noise, of_walks in zip(NOISE_CASES, zip(*mine, strict=True), strict=True):
-            names = {'part': 'walks', 'name': robot, 'variant': part, 'unit': '', 'value': 0.0}
+            names = {'part': 'walks', 'name': robot, 'variant': HELD_OUT, 'unit': '', 'value': 0.0}
             shipped = noise == NOISE_CASES[0]
             rows.append(row_of_walks(of_walks, shipped=shipped, note=noise.name, **names))
     return rows

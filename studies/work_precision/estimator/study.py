@@ -9,8 +9,8 @@ The truth is the motion of the contact over the floor; slips and false alarms ar
 studies/slips.py. With full dynamics (L2), feet on dry ground scrub all the time. So walks in the
 plane (L1), and standing feet that are pulled to and fro, are added for sticks.
 
-Walks with noise that is larger, or configured wrong, are counted on floors on which settings were
-chosen and on others, with intervals over walks.
+Walks with noise that is larger, or configured wrong, are counted on floors on which no setting was
+chosen, with intervals over walks.
 
 --walks 1 takes 2 minutes on two cores: one walk of each kind, and the ends of each change.
 
