@@ -99,8 +99,6 @@ class Slip:
 
         Return slip speed, m/s, whether the alarm is on, and the place of the contact, m.
         """
-        if not 0.0 < dt < math.inf:
-            dt = 0.1 * SMOOTHING
         x, y = to_x, to_y = sample.x + fx * self._shear, sample.y + fy * self._shear
         if self._joints:
             to_x, to_y = fx * self.softness, fy * self.softness

@@ -323,12 +323,14 @@ class Track:
         self.sound = True
         if not stood or dt > LONGEST_GAP:
             self._touch_down(time, sample, force, pressure)
+        if load >= AIRBORNE_LOAD * expected_load:
+            self._heights.last = sample.z
         if known and time - self._touched > alarm.SMOOTHING - 1e-9:
             self._stand(time, sample, force, pressure)
             return
         # While the foot lands, or the motion of the body is in doubt, there is no alarm, and
         # nothing is learnt.
-        self._window = Window(time, True, self._window.peak)
+        self._window = Window(time, True, max(self._window.peak, load))
         self.slip.touch_down(sample, force[0], force[1])
         self.last, self.time = Standing(0.0, *force), time
         if not known:
@@ -379,8 +381,6 @@ class Track:
         if known:
             turning = abs(sample.moment - self._offset.moment) / ground.foot.turning_radius
         self._window.add(fz, math.sqrt(fx * fx + fy * fy), turning, speed, slip.sd)
-        if fz >= AIRBORNE_LOAD * ground.expected_load:
-            self._heights.last = sample.z
         self.last, self.time = Standing(speed, fx, fy, fz, turning, slipping), time
         if time >= ground.tuning.filter_period + (self._window.start - 1e-9):
             noises = self.watch.force.noise, self._offset.sd, slip.contact_noise

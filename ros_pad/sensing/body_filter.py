@@ -49,8 +49,6 @@ class BodyFilter:
         Number of legs.
     gyro_noise, accelerometer_noise : float
         Standard deviation of a sample, rad/s and m/s².
-    gate : float
-        Squared Mahalanobis distance above which a foot is rejected.
 
     Attributes
     ----------
@@ -71,7 +69,6 @@ class BodyFilter:
         legs: int,
         gyro_noise: float,
         accelerometer_noise: float,
-        gate: float = GATE,
     ) -> None:
         size = FEET + 3 * legs
         self.turn = np.eye(3)
@@ -79,7 +76,7 @@ class BodyFilter:
         self.gyro_bias, self.force_bias = np.zeros(3), np.zeros(3)
         self.footholds = np.zeros((legs, 3))
         self.covariance = np.zeros((size, size))
-        self._noise, self._gate = np.array(3 * [gyro_noise] + 3 * [accelerometer_noise]), gate
+        self._noise = np.array(3 * [gyro_noise] + 3 * [accelerometer_noise])
         self._force = np.full(3, math.nan)  # the last reading
         # What errors, and errors of gyro and accelerometer, do in a step of a length, s.
         self._step, self._inputs, self._dt = np.eye(size), np.zeros((size, 6)), 0.0
@@ -103,8 +100,8 @@ class BodyFilter:
         turned[FEET:] = turn * skew(self.footholds).reshape(-1, 3)
         self.covariance += turned @ turned.T
 
-    def predict(self, dt: float, gyro: Array, force: Array, rolling: Array) -> Array:
-        """Advance by a step; return its mean velocity, (3,), m/s.
+    def predict(self, dt: float, gyro: Array, force: Array, rolling: Array) -> None:
+        """Advance by a step.
 
         Parameters
         ----------
@@ -124,7 +121,6 @@ class BodyFilter:
         self.footholds += dt * (rolling - mean)
         jump, self._force = force - self._force, force
         self._spread_on(dt, turn, DOUBTED * max(0.0, math.sqrt(jump @ jump) - IMPACT))
-        return mean
 
     def _spread_on(self, dt: float, turn: Array, impact: float) -> None:
         """Advance the covariance, with more noise of the accelerometer, m/s²."""
@@ -176,7 +172,7 @@ class BodyFilter:
         moved = np.zeros(free.shape, dtype=bool)
         root, _ = dpotrf(spread, lower=1)
         score, _ = dtrtrs(root, miss, lower=1)
-        if score @ score > self._gate:
+        if score @ score > GATE:
             root = self._reject(spread, miss, free, moved)
             _diagonal(self.covariance)[FEET:][moved.ravel()] += _ANYWHERE
         # Not dtrtrs for many columns: OpenBLAS wakes threads for it, for 100 µs or ms.
@@ -204,12 +200,11 @@ class BodyFilter:
             chosen = order.ravel()
             root, _ = dpotrf(spread[np.ix_(chosen, chosen)], lower=1)
             score, _ = dtrtrs(root, miss[chosen], lower=1)
-            bad = np.flatnonzero((score.reshape(-1, 3) ** 2).sum(1) > self._gate)
+            bad = np.flatnonzero((score.reshape(-1, 3) ** 2).sum(1) > GATE)
             if not bad.size:
                 break
             cells = order[bad[0]]
-            if not (free | moved)[cells[0] // 3, 0]:
-                cells = cells[:2]
+            cells = cells[2:] if (free | moved)[cells[0] // 3, 0] else cells[:2]
             diagonal[cells] += _ANYWHERE
             moved.ravel()[cells] = True
         root, _ = dpotrf(spread, lower=1)

@@ -14,7 +14,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.robots import Chains, Kinematics, Robot
 from ros_pad.robots.rotation import Array, cross, quaternion, rotation, skew
 from ros_pad.sensing import motion
-from ros_pad.sensing.body_filter import GATE, GRAVITY, BodyFilter, Flags
+from ros_pad.sensing.body_filter import GRAVITY, BodyFilter, Flags
 from ros_pad.sensing.motion import BodyEstimate, FootMotion, Sample, checked
 from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Unloaded
 from ros_pad.sensing.settings import SETTINGS
@@ -122,10 +122,8 @@ class BodyEstimator:
     def _reset(self) -> None:
         """Discard everything."""
         robot, given, legs = self._robot, self._given, len(self._robot.legs)
-        gate = GATE if given.rejection else math.inf
-        self._filter = BodyFilter(
-            legs, given.gyro_noise, math.hypot(given.accelerometer_noise, SHAKES), gate
-        )
+        force_noise = math.hypot(given.accelerometer_noise, SHAKES)
+        self._filter = BodyFilter(legs, given.gyro_noise, force_noise)
         self._time = math.nan
         self._step = 0.0  # the last one, s
         self._feet = motion.Feet(legs)
@@ -339,7 +337,7 @@ class BodyEstimator:
         """Update which feet stand; return those that landed with this sample."""
         before = self._feet.standing
         if sample.forces is None:
-            self._feet.standing = np.zeros_like(before)
+            self._feet.standing, self._feet.excluded = np.zeros((2, len(before)), dtype=bool)
             self._doubts.add(sample.time, 'force: neither foot forces nor efforts')
             return self._feet.standing
         loads = sample.forces @ self._filter.turn[2]
@@ -347,15 +345,12 @@ class BodyEstimator:
         gate = share * self._body.load
         self._feet.standing = loads > np.where(before, gate, gate + 3.0 * self._given.force_noise)
         lands = self._feet.standing & ~before
-        self._feet.excluded &= self._feet.standing
-        if self._given.rejection:
-            self._feet.excluded |= lands  # until they are slow
+        self._feet.excluded = (self._feet.excluded & self._feet.standing) | lands
+        self._feet.slow_since[lands] = math.inf
         return lands
 
     def _judge(self, time: float, moved: Flags, speeds: Array) -> None:
         """Update which feet are excluded; ``speeds`` of slip are in standard deviations."""
-        if not self._given.rejection:
-            return
         feet, fast = self._feet, speeds > TOO_FAST
         fresh = feet.standing & ~feet.excluded & (moved | fast)
         slow = feet.standing & ~(fresh | fast)

@@ -39,13 +39,14 @@ class FootMotion(NamedTuple):
     in_contact : bool
         Whether the foot carries load.
     slip_velocity : array (2,)
-        Velocity of the contact point, x and y, m/s: mean of the last 20 ms.
+        Velocity of the contact point, x and y, m/s, smoothed over 10 ms, from 20 ms after
+        touch-down on.
     slip_velocity_sd : float
         Standard deviation of each of its components, m/s. It includes that of the body's
         velocity, which is common to all feet and lasts for about a stance.
     excluded : bool
         Whether the foot carries load but is left out of the estimate of the body, but for its
-        height: it is not consistent with standing still, or has landed less than 12 ms ago.
+        height: it is not consistent with standing still, or has just landed.
     """
 
     position: Array
@@ -111,8 +112,6 @@ class Given(NamedTuple):
     force_axes : str
         ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
         of the feet.
-    rejection : bool
-        Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
     """
 
     gyro_noise: float = 0.005
@@ -123,7 +122,6 @@ class Given(NamedTuple):
     accelerometer_bias: float = 0.05
     contact_share: float = 0.0
     force_axes: str = 'base'
-    rejection: bool = True
 
 
 class Sample(NamedTuple):

@@ -11,13 +11,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, STYLE, VERMILION
+from studies.drawing import BLACK, BLUE, ORANGE, PURPLE, STYLE, VERMILION
 from studies.sensing.stability import AFTER, LIMIT, LONGEST, RATES, TIMED, Curve
 from studies.sensing.walks import RECORDED
 
 COLOURS = {
     'estimator': BLUE,
-    'no rejection': GREEN,
     'plain': VERMILION,
     'invariant, χ²': PURPLE,
     'odometry': ORANGE,

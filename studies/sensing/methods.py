@@ -17,7 +17,7 @@ from studies.samples import Flags
 from studies.sensing import rivals
 from studies.sensing.walks import Course, Log
 
-METHODS = ('estimator', 'no rejection', 'plain', 'invariant, χ²', 'odometry')
+METHODS = ('estimator', 'plain', 'invariant, χ²', 'odometry')
 
 
 class Track(NamedTuple):
@@ -36,7 +36,7 @@ class Track(NamedTuple):
     seconds: float  # an update
 
 
-def estimator_for(robot: Robot, course: Course, **arguments: Any) -> BodyEstimator:
+def estimator_for(robot: Robot, course: Course) -> BodyEstimator:
     """Return an estimator that knows the noise of a course."""
     noise = course.noise
     settings = {
@@ -47,7 +47,7 @@ def estimator_for(robot: Robot, course: Course, **arguments: Any) -> BodyEstimat
         'force_noise': noise.force,
         'accelerometer_bias': noise.accelerometer_bias,
     }
-    return BodyEstimator(robot, **(settings | arguments))
+    return BodyEstimator(robot, **settings)
 
 
 def readings(log: Log) -> Iterable[tuple[Any, ...]]:
@@ -56,9 +56,9 @@ def readings(log: Log) -> Iterable[tuple[Any, ...]]:
     return zip(log.time.tolist(), *columns, log.foot_forces, strict=True)
 
 
-def estimated(robot: Robot, log: Log, course: Course, **arguments: Any) -> Track:
-    """Run the estimator over a log; arguments are those of its constructor."""
-    estimator = estimator_for(robot, course, **arguments)
+def estimated(robot: Robot, log: Log, course: Course) -> Track:
+    """Run the estimator over a log."""
+    estimator = estimator_for(robot, course)
     begin = time.process_time()
     found = [estimator.update(*row) for row in readings(log)]
     seconds = (time.process_time() - begin) / len(found)
@@ -82,8 +82,6 @@ def track_of(robot: Robot, log: Log, course: Course, method: str) -> Track:
     """Run a method over a log."""
     if method == 'estimator':
         return estimated(robot, log, course)
-    if method == 'no rejection':
-        return estimated(robot, log, course, rejection=False)
     begin = time.process_time()
     if method in rivals.FILTERS:
         rows = rivals.FILTERS[method](robot, course).rows(log)

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Body and feet estimated from IMU, joints and foot forces, on simulated walks with known truth.
 
-Beside the estimator: the same without rejection of slipping feet, an invariant filter with and
-without rejection, and legged odometry (gyro, and the mean velocity of the feet that stand). Errors
-are vectors of x and y. Slips and false alarms are those of studies/slips.py, the alarm that of
-ros_pad.estimation. With --all, walks that are harder: long pushes, a cheap IMU; and where
-methods diverge: all feet slip, no foot stands, feet slide for long, low rates. With --picture,
-sensing.json and sensing.png: time an update against errors; and of --all, sensing_stability.json
-and .png.
+Beside the estimator: a plain filter and an invariant one, both with a χ² test of each foot, and
+legged odometry (gyro, and the mean velocity of the feet that stand). Errors are vectors of x and
+y. Slips and false alarms are those of studies/slips.py, the alarm that of ros_pad.estimation. With
+--all, walks that are harder: long pushes, a cheap IMU; and where methods diverge: all feet slip,
+no foot stands, feet slide for long, low rates. With --picture, sensing.json and sensing.png: time
+an update against errors; and of --all, sensing_stability.json and .png.
 """
 
 from __future__ import annotations

@@ -68,6 +68,29 @@ def test_an_uncertain_velocity_teaches_less():
     assert 0.5 < wetness(0.05) < wetness(0.005)
 
 
+def test_a_body_in_doubt_climbs():
+    """What a foot bears on higher ground is no offset of its sensor."""
+    estimator, time = FootEstimator(FOOT, LOAD, JOINTS), 0.0
+    noise = np.random.default_rng(1)
+
+    def move(samples, load, begin, end):
+        nonlocal time
+        for height in np.linspace(begin, end, samples):
+            time += PERIOD
+            force = [0.1 * load, 0.0, load] + 1e-3 * noise.standard_normal(3)
+            estimator.update(time, force.tolist(), (0, 0, float(height)), 0.0)
+            stood.append(estimator.estimate.standing)
+
+    for step in range(12):  # 8 mm each, with a quarter of the load as it begins and ends
+        stood = []
+        height = 0.008 * step
+        for load in (1.7, LOAD, 1.7):
+            move(20, load, height, height)
+        assert all(stood), step
+        move(20, 0.0, height, height + 0.05)
+        move(20, 0.0, height + 0.05, height + 0.008)
+
+
 def test_a_body_in_doubt_stops_alarm_and_learning():
     stance = Stance(0.005)
     for _ in range(100):

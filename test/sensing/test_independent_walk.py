@@ -18,13 +18,17 @@ def data():
 
 
 def test_the_body_is_no_worse_than_by_a_plain_filter():
-    """That of others is 4.4 mm/s off."""
+    """Asked: 4.5 mm/s, and at most 1 % of drift."""
     course, log = walks.COURSES[walks.RECORDED], walks.recorded()
     robot = walks.robot_of(course.robot)
     track = track_of(robot, log, course, 'estimator')
     late = log.time > 1.0
-    error = np.linalg.norm((track.velocity - log.velocity)[late, :2], axis=1)
-    assert np.sqrt((error**2).mean()) < 4.5e-3
+    plain = track_of(robot, log, course, 'plain')
+    ours, theirs = (
+        np.sqrt(((each.velocity - log.velocity)[late, :2] ** 2).sum(1).mean())
+        for each in (track, plain)
+    )
+    assert ours < min(1.05 * theirs, 4.5e-3)
     moved = (track.position - log.position)[[0, -1], :2]
     assert np.linalg.norm(moved[1] - moved[0]) < 0.01 * 5.7
     assert not track.doubt[late].any()

@@ -73,14 +73,6 @@ def test_a_leg_that_slips_alone_is_named():
     assert legs.against.tolist() == [True, False, False, False, False, False]
 
 
-def paced(slipping, seconds=12.0):
-    """Return the Legs of a quadruped whose feet slip in the steps that a function gives."""
-    legs = Legs(Robot.load('go2'))
-    for row in range(round(seconds / PERIOD)):
-        legs.update(PERIOD, STAND, slipping(row), np.full(4, 0.15), np.full(4, 0.2))
-    return legs
-
-
 def swung(offset, lasts=0.05, seconds=6.0, seed=4):
     """Return the Unloaded of four feet, the last one off by ``offset``, N, and its errors.
 

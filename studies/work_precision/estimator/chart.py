@@ -176,7 +176,7 @@ _DRAWN = (
 
 
 def draw_robustness(rows: Sequence[Row]) -> Figure:
-    """Return the picture of six changes that break a target, with intervals of the counts."""
+    """Return the picture of six changes, with targets, and intervals of the counts."""
     rows = [row for row in rows if row.part == 'robustness']
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 5.2))

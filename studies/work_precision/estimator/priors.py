@@ -197,7 +197,6 @@ def _blind(foot: Foot, load: float, tuning: Tuning, domed: bool) -> GroundFilter
     """Return what is expected of a foot before any measurement."""
     found = GroundFilter(GroundModel.of(foot, load, tuning))
     found.touch_down(0.0, domed)
-    found.fade(math.inf)  # films have drained
     return found
 
 

@@ -55,8 +55,8 @@ class Recording:
         Pressure of the pads that was last reported, Pa gauge.
     arrived : array of bool, (samples, legs)
         Whether the estimator gets the sample.
-    load, tangential, grip, speed : array, (samples, legs)
-        Truth: normal force, tangential force and capacity, N, and speed of the contact, m/s.
+    load, tangential, grip : array, (samples, legs)
+        Truth: normal force, tangential force and capacity, N.
     place : array, (samples, legs, 2)
         Truth: place of the contact, m.
     wet : array of bool, (samples, legs)
@@ -79,7 +79,6 @@ class Recording:
     load: Floats
     tangential: Floats
     grip: Floats
-    speed: Floats
     place: Floats
     wet: Flags
     sticks_only: bool = False
@@ -106,7 +105,7 @@ def record(
     if prepare:
         prepare(loop)
     true = [
-        [(*foot.position, *foot.force, foot.grip, foot.slip_speed, foot.wet)
+        [(*foot.position, *foot.force, foot.grip, foot.wet)
          for foot in loop.robot.feet]
         for _ in loop.walk()
         if not loop.robot.verdict
@@ -128,9 +127,8 @@ def record(
         load=truth[..., 5],
         tangential=np.hypot(truth[..., 3], truth[..., 4]),
         grip=truth[..., 6],
-        speed=truth[..., 7],
         place=truth[..., :2] + truth[..., 3:5] / scene.foot.shear_stiffness,
-        wet=truth[..., 8] > 0.5,
+        wet=truth[..., 7] > 0.5,
         sticks_only=level == 'L1' and scene.floor.kind == 'dry',
     )
 
@@ -170,7 +168,6 @@ def pull(scene: Scene, duration: float, seed: int) -> Recording:
         load=load * ones,
         tangential=tangential,
         grip=friction * load * ones,
-        speed=0.0 * ones,
         place=np.zeros((*shape[:2], 2)),
         wet=ones < 0.0,
         sticks_only=True,

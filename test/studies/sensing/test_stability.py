@@ -81,5 +81,4 @@ def test_while_all_feet_slip_the_accelerometer_carries_the_velocity_on(monkeypat
     assert min(doubts) == 1.0
     assert best.error[-1] < 0.01  # recovered
     assert not any(best.silent)
-    for rival in ('no rejection', 'odometry'):
-        assert stability.first(found[rival], found[rival].error, 0.08) < 0.3
+    assert stability.first(found['odometry'], found['odometry'].error, 0.08) < 0.3

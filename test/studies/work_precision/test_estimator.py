@@ -49,7 +49,6 @@ def walk(speed, load=None, **values):
         'load': loads,
         'tangential': np.zeros((count, 1)),
         'grip': 0.5 * loads,
-        'speed': true,
         'place': np.cumsum(true, axis=0)[..., None] * np.array([PERIOD, 0.0]),
         'wet': np.zeros((count, 1), dtype=bool),
     }
