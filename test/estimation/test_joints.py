@@ -78,7 +78,8 @@ def test_a_body_in_doubt_climbs():
         for height in np.linspace(begin, end, samples):
             time += PERIOD
             force = [0.1 * load, 0.0, load] + 1e-3 * noise.standard_normal(3)
-            estimator.update(time, force.tolist(), (0, 0, float(height)), 0.0)
+            motion = {'variance': math.inf if step else 1e-6}
+            estimator.update(time, force.tolist(), (0, 0, float(height)), 0.0, **motion)
             stood.append(estimator.estimate.standing)
 
     for step in range(12):  # 8 mm each, with a quarter of the load as it begins and ends
