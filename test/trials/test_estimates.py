@@ -65,7 +65,6 @@ def test_slips_raise_the_alarm_and_sticks_do_not(walks):
     ]
     row = slips.row_of(found)
     assert row['slips_5_mm'] > 150 and row['minutes_of_sticking'] > 0.9
-    assert row['missed_3_mm'] <= 0.05
     assert row['missed_5_mm'] <= 0.03  # in these the alarm is on already, from an earlier slip
     assert row['false_alarms_a_minute'] <= 1.1  # one
 

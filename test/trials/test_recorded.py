@@ -112,7 +112,7 @@ def record(trial, records, folder):
 
 def test_a_recorded_trial_is_the_trial_to_the_bit(tmp_path):
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=8)
-    loop = ClosedLoop(scene, 'adaptive', 0, 'L1')
+    loop = ClosedLoop(scene, 'adaptive', 1, 'L1')
     loops.walk(loop)
     trial = loop.trial()
     assert trial.slow['dome'].any() and not trial.slow['dome'].all()
