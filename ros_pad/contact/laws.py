@@ -224,7 +224,7 @@ def dry_share(foot: Any, film: Any, sphere: float) -> float:
     total = between_areas(foot, film, 0.0, pi * (radius - rim) * (radius - rim))
     if edge < area:
         total += between_areas(foot, film, edge, area)
-    for index in range(len(POINTS)):  # as `rim_film`, whose calls take longer
+    for index in range(len(POINTS)):  # not by calls of `rim_film`, which take longer
         inwards = POINTS[index] * rim
         thickness = slope * inwards
         share = dry(foot, thickness if thickness > least else least)
