@@ -116,6 +116,8 @@ setup(
         'sweep': ['distributed>=2024.1', 'pyarrow>=14'],
         # Meshes of pads from STL, OBJ, PLY and MSH files.
         'mesh': ['meshio>=5.3'],
+        # `pad mould`: moulds of a foot, with their drawing.
+        'make': ['manifold3d>=3.0', 'matplotlib>=3.6'],
         # `pad explore`: pads designed in the browser.
         'explore': ['matplotlib>=3.6', 'nicegui>=3.0', 'starlette>=0.40'],
         # The site: `make docs`.
@@ -126,6 +128,7 @@ setup(
             'distributed>=2024.1',
             'h5py',
             'hypothesis',
+            'manifold3d>=3.0',
             'mcap-ros2-support',
             'meshio>=5.3',
             'mpmath>=1.2',
@@ -140,6 +143,7 @@ setup(
             'ruff==0.17.*',
             'scikit-fem>=9',
             'setuptools>=77',
+            'trimesh>=4',
             'types-PyYAML',
             *DOCS,
         ],

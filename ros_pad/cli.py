@@ -33,6 +33,7 @@ COMMANDS = {
     'contact': 'compute shape, ring of liquid and force limits of one pad',
     'calibrate': 'fit a foot to measurements',
     'design': 'compute number, pressure and load of the pads on a sole',
+    'mould': 'make moulds, drawing, parts list and steps of a foot',
     'explore': 'show a foot on a page in the browser, with sliders',
     'wet': 'compute rise, pressure and force of the liquid round a meshed pad',
     'chart': 'measure time and error of every method on this machine',

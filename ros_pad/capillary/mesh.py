@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 
 from ros_pad.capillary.crossings import Indices, overlap
 from ros_pad.configuration import integer, number
+from ros_pad.contact.layout import hexagonal
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput, MeshError
 
@@ -386,17 +387,6 @@ def revolved(r: Array, z: Array, sectors: int, source: str) -> Mesh:
     bands.append(np.column_stack([np.full(sectors, low), there, here]))
     bands.append(np.column_stack([np.full(sectors, high), here + last, there + last]))
     return Mesh(points, np.concatenate(bands), source)
-
-
-def hexagonal(count: int) -> Array:
-    """Return the places of a hexagonal lattice of distance 1 that are nearest to its origin."""
-    reach = int(math.sqrt(count)) + 2
-    i, j = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    places = np.column_stack([i + 0.5 * j, math.sqrt(0.75) * j])
-    turn = np.arctan2(places[:, 1], places[:, 0])
-    order = np.lexsort((np.round(turn, 9), i * i + i * j + j * j))[:count]
-    chosen: Array = places[order]
-    return chosen
 
 
 # --- Reading ----------------------------------------------------------------------------------

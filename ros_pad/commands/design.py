@@ -238,10 +238,9 @@ def advice(each: Design) -> Iterator[str]:
         if each.pressure > each.ceiling:
             yield f'A supply of {each.pressure:.0f} Pa would be enough.'
         if math.isfinite(each.pads_needed):
-            area = each.pads_needed * CELL * each.pad.radius**2
             yield (
-                f'{each.pads_needed} pads would be enough, on a sole of {area:.3g} m² '
-                f'(radius {math.sqrt(area / math.pi):.3g} m).'
+                f'{each.pads_needed} pads would be enough, on a sole of radius'
+                f' {each.radius_needed:.3g} m or so.'
             )
     width = 2.0 * each.pad.radius
     flat = each.pitch < width

@@ -25,6 +25,7 @@ import numpy.typing as npt
 from ros_pad.configuration import instance, integer, number, quantity
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.hyperelastic import pressure_end
+from ros_pad.contact.layout import Layout, edge_of, pads_at
 from ros_pad.contact.limits import DEFAULT_CRITERION, force_limit, largest_pressure, pressure_for
 from ros_pad.contact.material import Material
 from ros_pad.contact.meniscus import Liquid
@@ -41,6 +42,8 @@ from ros_pad.errors import InvalidInput, NoEquilibrium
 
 # Sphere radius of the largest dome for which the pattern has room, over the pad radius (3.83).
 DOME = 1.5
+PITCH = 2.0 * DOME
+"""Distance of the centres of neighbouring pads between which such domes touch, in radii."""
 # Floor area per pad over radius²: hexagon around that sphere (3.87).
 CELL = 2.0 * math.sqrt(3.0) * DOME**2
 # The liquid of figure 10 of the thesis: water at a contact angle of 60 degrees.
@@ -215,7 +218,13 @@ class Design:
     @property
     def pads_without_touching(self) -> int:
         """Largest number of pads on the sole for which domes of this width do not touch."""
-        return math.floor(self.area / (0.5 * math.sqrt(3.0) * self.dome_width**2))
+        return pads_at(self.dome_width, self.pad.radius, math.sqrt(self.area / math.pi))
+
+    @property
+    def radius_needed(self) -> float:
+        """Radius of a sole, about, on which :attr:`pads_needed` have room, m."""
+        cells = math.sqrt(CELL * self.pads_needed / math.pi) * self.pad.radius
+        return cells + edge_of(self.pad.radius)
 
 
 def design(
@@ -236,11 +245,12 @@ def design(
     load : float
         Normal force on the foot, N, above 0.
     area : float
-        Area of the sole, m², at least one cell of :func:`pads_in`.
+        Area of the sole, m², with room for one pad and the edge around it.
     pad : Pad
         Size and material of one pad.
     pads : int, optional
-        Number of pads. By default :func:`pads_in`, rounded down.
+        Number of pads. By default as many as have room for domes with a sphere radius of 1.5
+        radii, and for the edge of a sole that can be cast (:mod:`ros_pad.contact.layout`).
     ceiling : float
         Highest pressure of the supply, Pa gauge, above 0. ``ceiling`` of the result is at most
         :func:`ros_pad.contact.limits.largest_pressure`.
@@ -287,7 +297,7 @@ def design(
         pad=pad,
         area=area,
         pads=pads,
-        pitch=math.sqrt(2.0 * area / (math.sqrt(3.0) * pads)),
+        pitch=Layout.of(pads, pad.radius, math.sqrt(area / math.pi)).pitch,
         load=load,
         load_per_pad=load / pads,
         margin=margin,
@@ -304,17 +314,11 @@ def design(
 
 def pads_for(area: float, pad: Pad, pads: int | None = None) -> int:
     """Return the number of pads on a sole: the given one if allowed, or else as many as fit."""
-    cell = CELL * pad.radius**2
-    # A float cannot hold the exact number of more than 2^53 pads.
-    number(f'area for pads of radius {pad.radius:g} m', area, 'm²', 0.0, 2.0**53 * cell)
-    if pads is not None:
-        return integer('pads', pads, 1, math.floor(area / (math.pi * pad.radius**2)))
-    # Rounding must not remove a pad from a sole whose area is a whole number of cells.
-    share = area / cell * (1.0 + 1e-12)
-    number(
-        f'area for one pad of radius {pad.radius:g} m', area, 'm²', cell if share < 1.0 else 0.0
-    )
-    return math.floor(share)
+    least = math.pi * (pad.radius + edge_of(pad.radius)) ** 2
+    number(f'area for one pad of radius {pad.radius:g} m', area, 'm²', least * (1.0 - 1e-12))
+    if pads is None:
+        return pads_at(PITCH * pad.radius, pad.radius, math.sqrt(area / math.pi))
+    return integer('pads', pads, 1, math.floor(area / (math.pi * pad.radius**2)))
 
 
 def _width(pad: Pad, pressure: float) -> float:
@@ -398,7 +402,7 @@ def candidates(
     load : float
         Normal force on the foot, N, above 0.
     area : float
-        Area of the sole, m², at least one cell of :func:`ros_pad.contact.pads_in`.
+        Area of the sole, m², with room for one pad and the edge around it.
     materials : sequence of Material
         The materials.
     thicknesses : sequence of float

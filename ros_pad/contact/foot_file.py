@@ -84,4 +84,7 @@ def foot_text(
     for each in FOOT_SETTINGS[1:]:
         words = _WORDS.get(each.name) or f'{each.unit}, {comment(each.name)}'.removeprefix(', ')
         lines.append(entry(each.name, getattr(foot, each.name), words))
-    return '\n'.join([*lines, f'force_limit: {foot.limit}']) + '\n'
+    lines.append(f'force_limit: {foot.limit}')
+    if foot.silicones:
+        lines.append(f'silicones: {json.dumps(foot.silicones)} # of the sheet, and of the body')
+    return '\n'.join(lines) + '\n'

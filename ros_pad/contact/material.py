@@ -17,13 +17,13 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ros_pad import configuration
-from ros_pad.configuration import Table, choice, number, quantity, shown, text
+from ros_pad.configuration import Setting, Table, choice, number, quantity, shown, text
 from ros_pad.errors import ConfigError, InvalidInput
 
 LAWS = {
@@ -43,6 +43,29 @@ UNKNOWN_STRETCH = 5.0
 """Uniaxial stretch up to which shapes are computed where the range of a material is unknown."""
 
 _Array = npt.NDArray[np.float64]
+
+
+_CASTING = (
+    Setting('density', float, 'Density.', 'kg/m³', 500.0, 3000.0),
+    Setting('viscosity', float, 'Viscosity when mixed.', 'Pa s', 1e-3, 1e4),
+    Setting('pot_life', float, 'Time from mixing until it must be poured.', 's', 10.0, 1e5),
+    Setting('cure_time', float, 'Time until it may be taken from a mould.', 's', 60.0, 1e6),
+    Setting('shrinkage', float, 'Largest linear shrinkage.', '', 0.0, 0.1),
+    Setting('mix', str, 'Ratio of its parts.'),
+    Setting('source', str, 'Where these are from.'),
+)
+
+
+class Casting(NamedTuple):
+    """How a silicone is cast, by its maker; the keys of ``casting`` in a material file, SI."""
+
+    density: float
+    viscosity: float
+    pot_life: float
+    cure_time: float
+    shrinkage: float
+    mix: str
+    source: str
 
 
 @dataclass(frozen=True)
@@ -68,6 +91,8 @@ class Material:
         between them. By default the factor itself, twice: no doubt.
     name, doubts : str
         Name or path of the file, and why ``factor_range`` is as wide as it is.
+    casting : Casting, optional
+        How it is cast, by its maker.
 
     Raises
     ------
@@ -90,6 +115,7 @@ class Material:
     factor_range: tuple[float, float] | None = field(default=None, compare=False)
     name: str = field(default='', compare=False)
     doubts: str = field(default='', compare=False)
+    casting: Casting | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         choice('law', self.law, tuple(LAWS))
@@ -147,7 +173,10 @@ class Material:
         source, doubts = table.text('source'), table.text('doubts', default='')
         for remark in ('description', 'licence'):
             table.text(remark, default='')
-        factor = factor_in(table)
+        factor, casting = factor_in(table), None
+        if 'casting' in table:
+            with table.table('casting') as part:
+                casting = Casting(**part.values(_CASTING))
         table.finish()
         try:
             return cls(
@@ -158,6 +187,7 @@ class Material:
                 **factor,
                 name=os.fspath(name_or_path),
                 doubts=doubts,
+                casting=casting,
             )
         except InvalidInput as error:
             raise ConfigError(f'{table.origin}: {error}') from error

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ros_pad import configuration
-from ros_pad.configuration import Setting, Table, choice, instance, integer, number, quantity
+from ros_pad.configuration import Setting, Table, choice, instance, integer, number, quantity, text
 from ros_pad.contact import laws
 from ros_pad.contact.dome import inflate, press
 from ros_pad.contact.film import LANDING, Film
@@ -132,6 +132,9 @@ class Foot:
         from ``pad wet``, or measured. 0 for none.
     sole_thickness : float
         Thickness of the silicone of the sole, which gives under load, m.
+    silicones : tuple of str
+        Names or paths of the materials of which the foot is cast: the sheet, then the body if that
+        is another. No number here rests on them; :mod:`ros_pad.making` casts with them.
 
     Raises
     ------
@@ -163,6 +166,7 @@ class Foot:
     limit: str = DEFAULT_CRITERION
     capillary_force: float = 0.0
     sole_thickness: float = 7e-3
+    silicones: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for each in FOOT_SETTINGS[1:]:
@@ -204,9 +208,16 @@ class Foot:
             pad = _pad(part)
         values = table.values(FOOT_SETTINGS)
         limit = table.choice('force_limit', CRITERIA, default=DEFAULT_CRITERION)
+        silicones = table.sequence('silicones', default=())
         table.finish()
         try:
-            return cls(source=os.fspath(name_or_path), pad=pad, limit=limit, **values)
+            return cls(
+                source=os.fspath(name_or_path),
+                pad=pad,
+                limit=limit,
+                silicones=tuple(text('silicones', each) for each in silicones),
+                **values,
+            )
         except InvalidInput as error:
             raise ConfigError(f'{table.origin}: {error}') from error
 

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ros_pad import contact
-from ros_pad.capillary.mesh import hexagonal
 from ros_pad.configuration import Setting, quantity
 from ros_pad.contact import Film, Foot, Inflated, Material, Meniscus, Pad, Pressed
+from ros_pad.contact.layout import Layout
 from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, largest_pressure
 from ros_pad.contact.pad import DOME_PRESSURE, Array
 from ros_pad.contact.resistance import DOMED, FOOT_SETTINGS, PAD_SETTINGS, RUBBER_SETTINGS
@@ -252,7 +252,7 @@ def explore(inputs: Inputs) -> Explored:
         loads=loads,
         curves=curves,
         switching=parts('pressure bore hose', _switched, inputs, foot, parts),
-        pitch=math.nan if pitch is None else pitch,
+        pitch=pitch if pitch and math.isfinite(pitch) else math.nan,
         remarks=tuple(parts.remarks),
     )
 
@@ -312,12 +312,11 @@ def _below_ceiling(inputs: Inputs, foot: Foot) -> None:
 def _pitch(inputs: Inputs, free: Inflated | None, parts: _Parts) -> float:
     """Return the pitch of the pads in a hexagonal pattern over the sole, m."""
     radius = inputs['radius']
-    reach = float(np.hypot(*hexagonal(inputs['pads']).T).max())
-    pitch = max(inputs['sole_radius'] - radius, 0.0) / max(reach, 0.5)
+    pitch = max(Layout.of(inputs['pads'], radius, inputs['sole_radius']).pitch, 0.0)
     width = 2.0 * radius
     if free is not None and free.height > radius:
         width = 2.0 * free.sphere_radius
-    if inputs['pads'] > 1 and pitch < width:
+    if pitch < width:
         what = 'pads overlap' if pitch < 2.0 * radius else 'free domes touch one another'
         parts.note(
             'pads',

@@ -19,16 +19,13 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ros_pad.capillary.mesh import hexagonal
 from ros_pad.contact.dome import press
+from ros_pad.contact.layout import Layout
 from ros_pad.contact.resistance import DISC_TURNING_RADIUS, DOMED, Foot
 from studies import command
 from studies.drawing import BLACK, BLUE, ORANGE, SKY, STYLE, VERMILION
 
 FEET = ('large19', 'large37', 'large331', 'small217')
-PITCH = 3.0
-"""Distance of neighbouring pads in the hexagonal pattern of the feet, in radii of a pad."""
-
 FINE, COARSE = 200, 24
 """Rings of the quadrature of a disc that is alone, and of each disc of many; sectors are twice."""
 
@@ -90,7 +87,7 @@ def domes(foot: Foot, rings: int) -> Patch:
     pressure = DOMED * foot.ceiling
     load = 0.5 * foot.dome_load(math.inf, pressure) / foot.pads
     width = float(press(foot.pad, pressure, load).contact_radius)
-    places = PITCH * foot.pad.radius * hexagonal(foot.pads)
+    places = Layout.of(foot.pads, foot.pad.radius, foot.sole_radius).places
     points, shares = (
         many(places, width, rings) if rings > 1 else (places, np.full(foot.pads, 1.0 / foot.pads))
     )

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What to expect of a foot as it is made: by its model, for a sheet a little off its thickness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from ros_pad.contact import Foot, Material, Pad, force_limit, inflate
+from ros_pad.contact.foot_file import foot_text
+from ros_pad.contact.limits import DEFAULT_CRITERION, largest_pressure
+from ros_pad.contact.pad import with_constant
+from ros_pad.contact.resistance import DOMED
+from ros_pad.making.plan import Plan
+from ros_pad.making.solids import Part
+
+DENSITY = {'filament': 1040.0, 'resin': 1150.0, 'film': 1380.0}
+"""Density of printed ABS, cured resin and polyester film, kg/m³."""
+
+
+class Expected(NamedTuple):
+    """What a thickness of the sheet means.
+
+    Attributes
+    ----------
+    thickness : float
+        Of the sheet, m.
+    stiffness : float
+        Of a pad, N/m.
+    pressure : float
+        For the dome that the foot as designed has at 0.85 of its ceiling, Pa.
+    height : float
+        Of the dome at that pressure of the foot as designed, m; NaN above the end of the model.
+    force_limit : float
+        Of all pads at the ceiling, N; NaN above the end of the model.
+    largest : float
+        Pressure at which a pad balloons or its model ends, Pa.
+    """
+
+    thickness: float
+    stiffness: float
+    pressure: float
+    height: float
+    force_limit: float
+    largest: float
+
+
+class Batch(NamedTuple):
+    """What to weigh of a silicone: the mass that stays in the foot, and both parts, kg."""
+
+    material: Material
+    mass: float
+    mixed: float
+
+
+def expected(made: Plan) -> list[Expected]:
+    """Return what to expect of the thinnest, the designed and the thickest sheet."""
+    foot, off = made.foot, 1e-3 * made.set['tolerance']
+    # A limit that was measured holds for its own pad alone.
+    criterion = DEFAULT_CRITERION if foot.limit == 'measured' else foot.limit
+    rows = []
+    for thickness in (_sheet(foot) - off, _sheet(foot), _sheet(foot) + off):
+        pad, share = _with_sheet(foot.pad, thickness), thickness / _sheet(foot)
+        # Arrays have NaN above the end of a model.
+        height = float(inflate(pad, [DOMED * foot.ceiling]).height[0])
+        limit = float(force_limit(pad, [foot.ceiling], criterion)[0])
+        # Of one shape, tension and pressure are in proportion to the thickness.
+        pressure = share * DOMED * foot.ceiling
+        rows.append(
+            Expected(
+                thickness,
+                pad.stiffness,
+                pressure,
+                height,
+                foot.pads * limit,
+                largest_pressure(pad),
+            )
+        )
+    return rows
+
+
+def _sheet(foot: Foot) -> float:
+    assert foot.pad.thickness is not None
+    return foot.pad.thickness
+
+
+def _with_sheet(pad: Pad, thickness: float) -> Pad:
+    """Return a pad with another thickness, and so another stiffness."""
+    if pad.material is not None:
+        return with_constant(pad, 'thickness', thickness)
+    assert pad.thickness is not None
+    share = thickness / pad.thickness
+    return replace(pad, stiffness=share * pad.stiffness, thickness=thickness, measured_limit=None)
+
+
+def ceiling_of(made: Plan) -> float:
+    """Return the ceiling, Pa, up to which no pad balloons in the worst case; at most the foot's.
+
+    All pads share one plenum: the thinnest takes all the air once it balloons.
+    """
+    pad = _with_sheet(made.foot.pad, _sheet(made.foot) - 1e-3 * made.set['tolerance'])
+    if pad.material is not None and pad.material.factor_range is not None:
+        pad = with_constant(pad, 'factor', pad.material.factor_range[0])
+    return min(made.foot.ceiling, 100.0 * math.floor(0.0099 * largest_pressure(pad)))
+
+
+def batches(made: Plan, parts: Mapping[str, Part]) -> list[Batch]:
+    """Return what to weigh of each silicone, with a fifth or 5 g of waste."""
+    rows = []
+    for material in dict.fromkeys((made.sheet, made.body)):
+        assert material.casting is not None
+        volume = sum(part.solid.volume() for part in parts.values() if part.made == material.name)
+        mass = 1e-9 * volume * material.casting.density
+        rows.append(Batch(material, mass, max(1.2 * mass, mass + 5e-3)))
+    return rows
+
+
+def as_made(made: Plan, parts: Mapping[str, Part]) -> str:
+    """Return the foot file of the foot as it is made, which ``pad calibrate`` fills."""
+    foot = made.foot
+    foot = replace(
+        foot,
+        ceiling=ceiling_of(made),
+        chamber_volume=1e-9 * parts['air'].solid.volume(),
+        sole_thickness=1e-3 * (made.z['bone'] if made.process == 'large' else made.z['top']),
+    )
+    head = [
+        f'Made by pad mould from {made.foot.source}: volume of air, silicone under the sole and',
+        'ceiling are those of its moulds; everything else is of that foot.',
+        'Measure, then: pad calibrate measurements.csv --foot as_made.yaml',
+    ]
+    comments = {'sole_thickness': 'under the bone' if made.process == 'large' else 'of the body'}
+    return foot_text(foot, f'{made.foot.source}, as made', head, comments)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files for printers and cutters: STL, 3MF and DXF, in millimetres."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Iterable, Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ros_pad.making.solids import Part, Solid, as_printed
+
+_TYPES = (
+    '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+    '<Default Extension="rels"'
+    ' ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    '<Default Extension="model"'
+    ' ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>'
+)
+_RELATIONS = (
+    '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+    '<Relationship Id="r0" Target="/3D/3dmodel.model"'
+    ' Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'
+)
+_MODEL = 'http://schemas.microsoft.com/3dmanufacturing/core/2015/02'
+
+
+def stl(solid: Solid) -> bytes:
+    """Return a solid as a binary STL file."""
+    mesh = solid.to_mesh()
+    corners = np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts)]
+    rows = np.zeros(len(corners), np.dtype([('n', '<3f4'), ('p', '<9f4'), ('flags', '<u2')]))
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    rows['n'] = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+    rows['p'] = corners.reshape(-1, 9)
+    return b'ros_pad, mm'.ljust(80) + len(rows).to_bytes(4, 'little') + rows.tobytes()
+
+
+def three_mf(parts: Iterable[Part]) -> bytes:
+    """Return parts as they are printed, side by side, as one 3MF file."""
+    objects, items, left = [], [], 0.0
+    for number, part in enumerate(parts, 1):
+        solid = as_printed(part)
+        x, y, _, far, _, _ = solid.bounding_box()
+        mesh = solid.translate((left - x, -y, 0.0)).to_mesh()
+        left += far - x + 5.0
+        points = ''.join(
+            '<vertex x="{:.6f}" y="{:.6f}" z="{:.6f}"/>'.format(*each)
+            for each in np.asarray(mesh.vert_properties)[:, :3].tolist()
+        )
+        faces = ''.join(
+            '<triangle v1="{}" v2="{}" v3="{}"/>'.format(*each)
+            for each in np.asarray(mesh.tri_verts).tolist()
+        )
+        objects.append(
+            f'<object id="{number}" type="model" name={quoteattr(part.name)}><mesh>'
+            f'<vertices>{points}</vertices><triangles>{faces}</triangles></mesh></object>'
+        )
+        items.append(f'<item objectid="{number}"/>')
+    model = (
+        f'<?xml version="1.0" encoding="UTF-8"?><model unit="millimeter" xml:lang="en"'
+        f' xmlns="{_MODEL}"><resources>{"".join(objects)}</resources>'
+        f'<build>{"".join(items)}</build></model>'
+    )
+    names = '[Content_Types].xml', '_rels/.rels', '3D/3dmodel.model'
+    return zipped(dict(zip(names, (_TYPES, _RELATIONS, model), strict=True)))
+
+
+def zipped(files: dict[str, str | bytes]) -> bytes:
+    """Return files by name as a ZIP; the same files give the same bytes."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            entry = zipfile.ZipInfo(name)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, data)
+    return stream.getvalue()
+
+
+def dxf(circles: Sequence[tuple[float, float, float]]) -> str:
+    """Return circles (x, y, radius in mm) as a DXF drawing, for a plotter or a laser cutter."""
+    rows = ['0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC', '0\nSECTION\n2\nENTITIES']
+    rows += [
+        f'0\nCIRCLE\n8\n0\n10\n{x:.4f}\n20\n{y:.4f}\n30\n0.0\n40\n{radius:.4f}'
+        for x, y, radius in circles
+    ]
+    return '\n'.join([*rows, '0\nENDSEC', '0\nEOF\n'])

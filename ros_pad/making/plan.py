@@ -1,0 +1,326 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Dimensions of a foot and of its moulds, and why a foot cannot be made.
+
+Lengths of a :class:`Plan` are millimetres; z is 0 on the floor and grows towards the leg.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ros_pad.configuration import Setting, choice, nearest
+from ros_pad.contact import Foot, Material
+from ros_pad.contact.layout import LARGE, LINING, RIM, SKIN, WALL, Layout, hexagonal, reach_of
+from ros_pad.contact.pad import Array
+from ros_pad.errors import InvalidInput
+
+PROCESSES = ('large', 'small')
+"""A printed bone wrapped in silicone (thesis 5.1.1), and a body of silicone under a softer sheet
+(5.1.2)."""
+
+STRENGTH = 15.0  # MPa in bending: half of what printed ABS breaks at in its layers
+_POISSON = 0.35  # of ABS
+
+
+def _length(name: str, default: float, description: str, high: float = 0.1) -> Setting:
+    return Setting(name, default, description, 'm', 0.0, high)
+
+
+SETTINGS = (
+    _length('tolerance', 0.05e-3, 'How far the thickness of the sheet may be off.'),
+    _length('nozzle', 0.4e-3, 'Nozzle of the filament printer.'),
+    _length('wall', WALL, 'Smallest wall of the filament printer.'),
+    _length('hole', 1e-3, 'Smallest hole of the filament printer, in diameter.'),
+    _length('clearance', 0.2e-3, 'Gap of printed parts that fit into one another, on each side.'),
+    _length('bed', 0.145, 'Side of the smaller of the two print beds.', 2.0),
+    _length('pin', 0.3e-3, 'Smallest pin of the resin printer, in diameter.'),
+    Setting('slenderness', 20.0, 'Largest length of a pin over its diameter.', '', 1.0, 100.0),
+    Setting('draft', 0.25, 'Angle by which pins and bores open.', 'degrees', 0.0, 5.0),
+    _length('web', 0.2e-3, 'Smallest wall of silicone.'),
+    _length('lining', LINING, 'Silicone between a pin and the bone.'),
+    _length('skin', SKIN, 'Silicone around the bone.'),
+    _length('under', 0.8e-3, 'Silicone between the sheet and the bone.'),
+    _length('rim', RIM, 'Silicone around the outermost pads of a sole without a bone.'),
+    _length('bone', 0.0, 'Thickness of the bone; 0: as thick as it must be, from 8 mm.'),
+    _length('flange', 3e-3, 'Thickness of the flange of the bone.'),
+    Setting('load', 0.0, 'Peak load; 0: three times the force limit.', 'N', 0.0, 1e5),
+    _length('screw', 3e-3, 'Diameter of the screws.'),
+    _length('fitting', 4.2e-3, 'Hole for the fitting of the hose: to be tapped to M5.'),
+    Setting('mount_holes', 3, 'Holes in the cap for the leg.', '', 0, 24),
+    _length('mount_hole', 2.5e-3, 'Their diameter: screws of 3 mm cut their thread.'),
+    _length('mount_circle', 20e-3, 'Diameter of the circle on which they are.'),
+)
+"""Limits of printers, walls, screws and holes, SI."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Dimensions of a foot and of its moulds.
+
+    Attributes
+    ----------
+    foot : Foot
+    process : str
+        One of :data:`PROCESSES`.
+    given : dict of str to float
+        Settings that were asked for, SI.
+    set : dict of str to float
+        :data:`SETTINGS` in millimetres, N, degrees.
+    places : array, (pads, 2)
+        Centres of the pads, mm.
+    pitch : float
+        Distance of neighbouring pads, mm; infinite for one pad.
+    z, r : dict of str to float
+        Heights above the floor and radii by name, mm.
+    sheet, body : Material
+        What the sheet and the body are cast of.
+    """
+
+    foot: Foot
+    process: str
+    given: dict[str, float]
+    set: dict[str, float]
+    places: Array
+    pitch: float
+    z: dict[str, float]
+    r: dict[str, float]
+    sheet: Material
+    body: Material
+
+    lid_angles = (50.0, 165.0, 295.0)
+    plate_angles = (20.0, 130.0, 250.0)
+
+    @property
+    def screws(self) -> int:
+        """Number of screws between cap and bone or retainer: one every 25 mm, at least six."""
+        return max(6, math.ceil(2.0 * math.pi * self.r['screws'] / 25.0))
+
+    def pegs(self, angles: Sequence[float]) -> list[tuple[float, float]]:
+        """Return places of pegs between ring and plate or lid, mm, at angles in degrees."""
+        radius = self.r['outer'] - 3.2
+        turns = [math.radians(angle) for angle in angles]
+        return [(radius * math.cos(a), radius * math.sin(a)) for a in turns]
+
+    @property
+    def load(self) -> float:
+        """Peak load, N."""
+        return self.set['load'] or 3.0 * self.foot.limits[-1]
+
+    @property
+    def bulge(self) -> float:
+        """How far the sole without a bone bulges at the ceiling, mm: a clamped plate.
+
+        Modulus three times the shear modulus of its material; holes and sheet are left out.
+        """
+        thick, modulus = self.z['top'] - self.z['sheet'], 3e-6 * self.body.shear_modulus
+        # ν = 0.5: q a⁴/(64 D) with D = E h³/9.
+        return 9e-6 * self.foot.ceiling * self.r['plenum'] ** 4 / (64.0 * modulus * thick**3)
+
+
+def process_of(foot: Foot) -> str:
+    """Return the process by which a foot is made: large from pads of 1 mm radius on."""
+    return 'large' if foot.pad.radius >= LARGE else 'small'
+
+
+def settings_of(given: Mapping[str, Any]) -> dict[str, float]:
+    """Return :data:`SETTINGS` with the given values, lengths in mm."""
+    known = {each.name: each for each in SETTINGS}
+    for name in given:
+        if name not in known:
+            hint = nearest(name, list(known)) or '.'
+            raise InvalidInput(f'{name} is no setting of moulds{hint}')
+    return {
+        name: setting.accept(given.get(name, setting.default))
+        * (1e3 if setting.unit == 'm' else 1.0)
+        for name, setting in known.items()
+    }
+
+
+def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None = None) -> Plan:
+    """Return the dimensions of a foot and of its moulds.
+
+    Parameters
+    ----------
+    foot : Foot
+        Its ``silicones`` say what it is cast of.
+    process : {'large', 'small'}, optional
+        By default :func:`process_of`.
+    given : dict of str to float, optional
+        Values of :data:`SETTINGS`, SI.
+
+    Raises
+    ------
+    InvalidInput
+        When a setting is not allowed or the foot cannot be made; the message has every reason,
+        each with the number that would do.
+    """
+    process = choice('process', process or process_of(foot), PROCESSES)
+    use = settings_of(given or {})
+    sheet, body = _silicones(foot, process)
+    large = process == 'large'
+    edge = use['lining'] + use['wall'] + use['skin'] if large else use['rim']
+    layout = Layout.of(foot.pads, foot.pad.radius, foot.sole_radius, 1e-3 * edge)
+    places, pitch = 1e3 * layout.places, 1e3 * layout.pitch
+    made = Plan(foot, process, dict(given or {}), use, places, pitch, {}, {}, sheet, body)
+    if pitch <= 0.0 or foot.pad.thickness is None or 1e3 * foot.sole_radius < _least(made, edge):
+        raise InvalidInput('; '.join(_no_room(made, edge)))
+    if large:
+        use['bone'] = use['bone'] or max(8.0, 0.5 * math.ceil(2.0 * bone_needed(made)))
+    made.z.update(_heights(made))
+    made.r.update(_radii(made, reach_of(places)))
+    if reasons := _reasons(made):
+        raise InvalidInput(
+            f'{foot.source} cannot be made ({process} process): {"; ".join(reasons)}'
+        )
+    return made
+
+
+def _silicones(foot: Foot, process: str) -> tuple[Material, Material]:
+    names = foot.silicones
+    own = foot.pad.material.name if foot.pad.material is not None else ''
+    if own and (not names or own != names[0]):
+        names = (own, *names[1:])
+    if not names or (process == 'small' and len(names) < 2):
+        need = 'sheet and body' if process == 'small' else 'sheet'
+        raise InvalidInput(
+            f'{foot.source}: silicones = {list(names)} is not allowed: the names of materials of'
+            f' {need} are needed, as [ecoflex_00_20, dragon_skin_30]'
+        )
+    found = Material.load(names[0]), Material.load(names[-1] if process == 'small' else names[0])
+    for name, each in zip(names, found, strict=False):
+        if each.casting is None:
+            raise InvalidInput(f'{name}: how it is cast is not known: the key casting is missing')
+    return found
+
+
+def _heights(made: Plan) -> dict[str, float]:
+    use = made.set
+    sheet = 1e3 * (made.foot.pad.thickness or 0.0)
+    if made.process == 'large':
+        bone = sheet + use['under']
+        top = bone + use['bone']
+        z = {'bone': bone, 'flange': top - use['flange'], 'top': top, 'face': top + 1.0}
+        z |= {'stop': top, 'land': top + 0.8}
+    else:
+        top = 1e3 * made.foot.sole_thickness
+        z = {'flange': top - 2.0, 'top': top, 'face': top, 'stop': top - 0.4, 'land': top - 0.4}
+    roof = z['face'] + 2.0
+    return {'sheet': sheet, **z, 'roof': roof, 'cap': roof + 6.0}
+
+
+def _radii(made: Plan, reach: float) -> dict[str, float]:
+    use, z, large = made.set, made.z, made.process == 'large'
+    pad, sole = 1e3 * made.foot.pad.radius, 1e3 * made.foot.sole_radius
+    slope = math.tan(math.radians(use['draft']))
+    root = pad + slope * (z['face'] - z['sheet'])
+    bore = sole + slope * (z['flange'] - z['sheet'])
+    plenum = reach + root + (1.0 if large else 0.5)
+    gasket = plenum + 2.0 if large else bore + 3.0
+    hole = 0.5 * use['screw'] + 0.2
+    screws = gasket + 1.0 + use['wall'] + hole
+    flange = screws + hole + 2.0
+    return {
+        **{'pad': pad, 'root': root, 'sole': sole, 'bore': bore, 'plenum': plenum},
+        **{'gasket': gasket, 'screw': hole, 'screws': screws, 'flange': flange},
+        **{'outer': flange + use['clearance'] + 6.0, 'hole': pad + use['lining']},
+        'bone': sole - use['skin'],
+    }
+
+
+def _least(made: Plan, edge: float) -> float:
+    """Return the least radius of the sole, mm, for walls between the pads and at the edge."""
+    use, radius = made.set, 1e3 * made.foot.pad.radius
+    if made.process == 'large':
+        cell = 2.0 * (radius + use['lining']) + use['wall']
+    else:
+        slope = math.tan(math.radians(use['draft']))
+        long = 1e3 * (made.foot.sole_thickness - (made.foot.pad.thickness or 0.0))
+        cell = 2.0 * (radius + slope * long) + use['web']
+    shape = hexagonal(made.foot.pads)
+    return cell * reach_of(shape - shape.mean(axis=0)) + radius + edge
+
+
+def _no_room(made: Plan, edge: float) -> list[str]:
+    foot = made.foot
+    if foot.pad.thickness is None:
+        return [f'{foot.source}: the thickness of the sheet is missing']
+    wall = 'walls of the bone' if made.process == 'large' else 'walls of silicone'
+    least = 0.1 * math.ceil(10.0 * _least(made, edge) - 1e-9)
+    return [
+        f'{foot.source} cannot be made ({made.process} process): {foot.pads} pads of radius'
+        f' {1e3 * foot.pad.radius:g} mm on a sole of radius {1e3 * foot.sole_radius:g} mm leave no'
+        f' room for {wall} between them and for the edge: sole_radius of at least {least:.1f} mm'
+        ' is needed, or fewer pads'
+    ]
+
+
+def _reasons(made: Plan) -> list[str]:
+    """Return why a foot cannot be made, each with the number that would do."""
+    use, z, r = made.set, made.z, made.r
+    found = []
+
+    def need(name: str, value: float, least: float, unit: str = 'mm') -> None:
+        if value < least - 1e-9:
+            found.append(f'{name} is {value:.3g} {unit}, at least {least:.3g} {unit} is needed')
+
+    def most(name: str, value: float, limit: float, unit: str = 'mm') -> None:
+        if value > limit + 1e-9:
+            found.append(f'{name} is {value:.3g} {unit}, at most {limit:.3g} {unit} is allowed')
+
+    long = z['face'] - z['sheet']
+    need('the sheet, for this tolerance,', z['sheet'], 2.0 * use['tolerance'])
+    most('the sheet', z['sheet'], 0.9 * r['pad'])
+    need('a pad, as a pin of resin, in diameter', 2.0 * r['pad'], use['pin'])
+    need('a pad, as a pin of this length, in diameter', 2.0 * r['pad'], long / use['slenderness'])
+    need('wall', use['wall'], 2.0 * use['nozzle'])
+    most('the largest part', 2.0 * r['outer'], use['bed'])
+    if made.process == 'large':
+        slope = r['root'] - r['pad']
+        need('the lining of silicone beside the root of a pin', use['lining'] - slope, use['web'])
+        need('skin', use['skin'], use['web'])
+        need('under', use['under'], use['web'])
+        need('a hole of the bone, in diameter,', 2.0 * r['hole'], use['hole'])
+        need('bone', use['bone'], max(bone_needed(made), use['flange'] + 2.0))
+        need('flange', use['flange'], flange_needed(made))
+    else:
+        need('sole_thickness', z['top'], z['sheet'] + 3.0)
+    need('the roof of the cap', z['cap'] - z['roof'], _plate(made.foot.ceiling, r['plenum'], 1.0))
+    if use['mount_holes'] and made.foot.pads > 1:
+        middle, half = 0.5 * use['mount_circle'], 0.5 * use['mount_hole']
+        least = 0.5 * use['fitting'] + use['wall'] + half
+        need('mount_circle, beside the fitting,', 2.0 * middle, 2.0 * least)
+        outside = r['screws'] - r['screw'] - use['wall'] - half
+        most('mount_circle, beside the screws,', 2.0 * middle, 2.0 * outside)
+    return found
+
+
+def _plate(pressure: float, radius: float, solid: float) -> float:
+    """Return the thickness, mm, that a plate supported at its rim needs under a pressure, Pa.
+
+    The stress in its middle is 3 (3 + ν)/8 p (radius/thickness)², over the share of a row of holes
+    that is solid (ligament efficiency).
+    """
+    stress = 3.0 * (3.0 + _POISSON) / 8.0 * 1e-6 * pressure / solid
+    return radius * math.sqrt(stress / STRENGTH)
+
+
+def _worst(made: Plan) -> float:
+    """Return the larger of the ceiling and the peak load over the sole, Pa."""
+    return max(made.foot.ceiling, made.load / made.foot.sole_area)
+
+
+def bone_needed(made: Plan) -> float:
+    """Return the least thickness of the bone, mm: a plate with holes, supported at its rim."""
+    hole = 2e3 * made.foot.pad.radius + 2.0 * made.set['lining']
+    solid = 1.0 - hole / made.pitch
+    return _plate(_worst(made), 1e3 * made.foot.sole_radius - made.set['skin'], solid)
+
+
+def flange_needed(made: Plan) -> float:
+    """Return the least thickness of the bone's flange, mm: a beam from the screws to the bone."""
+    line = 0.5e-6 * _worst(made) * made.r['bone']  # N/mm
+    lever = made.r['screws'] - made.r['bone']
+    return math.sqrt(6.0 * line * lever / STRENGTH)

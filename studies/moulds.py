@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Judge the moulds of shipped and of random feet by programs and formulas that made none of them.
+
+Parts are judged closed by trimesh and, where it is installed, by admesh; volumes by formulas of
+circles; what is put together overlaps nowhere but where it is squeezed; moulds come off without
+undercut; a flood fill of voxels leads from the inlet to every pad and nowhere else; the sheet under
+every pad is as thick as it was asked. With prusa-slicer (FDM, 0.2 mm) also layers, time and mass.
+
+For example:
+  python -m studies moulds --random 50
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.path import Path
+
+from ros_pad.commands.command import print_table
+from ros_pad.commands.progress import bar
+from ros_pad.configuration import names
+from ros_pad.contact import Foot, Material, Pad
+from ros_pad.contact.layout import edge_of, hexagonal, reach_of
+from ros_pad.contact.pad import Array
+from ros_pad.errors import InvalidInput
+from ros_pad.making import Part, Plan, build, plan
+from ros_pad.making.files import stl
+from ros_pad.making.solids import Solid, as_printed
+from ros_pad.reports.mould_drawings import assembled, moulded
+from ros_pad.reports.moulds import PRINTED, test_piece
+from studies import command
+
+FEET = ('large37', 'large331', 'small217')
+_OFF = 0.01  # share by which a volume may be off its formula: chords of circles
+_EMPTY = 1e-3  # mm³ of overlap that is rounding
+
+
+# --- judges ----------------------------------------------------------------------------------------
+
+
+def faults(made: Plan, parts: Mapping[str, Part], voxel: float | None = None) -> list[str]:
+    """Return what is wrong with the parts of a foot, in words."""
+    found = [f'{part.name} is not closed' for part in parts.values() if not closed(part)]
+    found += [f'{name}: volume' for name, off in volumes(made, parts) if abs(off) > _OFF]
+    found += overlaps(made, parts)
+    found += undercuts(parts)
+    found += thicknesses(made, parts)
+    return found + leaks(made, parts, voxel or max(0.3 * made.r['pad'], 0.05))
+
+
+def closed(part: Part) -> bool:
+    """Return whether trimesh and admesh find the part closed, and all its faces turned outwards."""
+    import trimesh
+
+    data = stl(as_printed(part))
+    mesh = trimesh.load(io.BytesIO(data), file_type='stl')
+    good = mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0
+    if not shutil.which('admesh'):
+        return bool(good)
+    with tempfile.NamedTemporaryFile(suffix='.stl') as file:
+        file.write(data)
+        file.flush()
+        told = subprocess.run(['admesh', file.name], capture_output=True, text=True).stdout
+    # Of facets: before and after its repair; edges fixed, removed, added, reversed.
+    apart = re.findall(r'disconnected edges? *: +(\d+)', told)
+    mended = re.findall(r'(?:Edges fixed|Facets (?:re|ad)\w+|Backwards edges) *: *(\d+)', told)
+    return bool(good and len(apart) == 3 and not any(map(int, [*apart, *mended])))
+
+
+def _cone(low: float, high: float, start: float, end: float) -> float:
+    """Return the volume of a cone between heights."""
+    return math.pi / 3.0 * (high - low) * (start * start + start * end + end * end)
+
+
+def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]]:
+    """Yield parts and how far their volumes are off the formulas of circles, as a share."""
+    z, r, use, pads = made.z, made.r, made.set, made.foot.pads
+    slope = math.tan(math.radians(use['draft']))
+    pin = _cone(z['sheet'], z['face'], r['pad'], r['root'])
+    sheet = math.pi * r['sole'] ** 2 * z['sheet']
+    wall = _cone(z['sheet'], z['flange'], r['sole'], r['bore'])
+    screw = math.pi * r['screw'] ** 2 * made.screws
+    formulas = {
+        'air': pads * pin
+        + math.pi * r['plenum'] ** 2 * (z['roof'] - z['face'])
+        + math.pi * (0.5 * use['fitting']) ** 2 * (z['cap'] - z['roof'])
+    }
+    if made.process == 'large':
+        flange = z['top'] - z['flange']
+        hole = math.pi * r['hole'] ** 2
+        seal = _cone(z['top'], z['face'], r['gasket'], r['gasket'] - slope)
+        core = math.pi * r['bone'] ** 2 * (z['flange'] - z['bone'])
+        formulas['bone'] = (
+            core + (math.pi * r['flange'] ** 2 - screw) * flange - pads * hole * use['bone']
+        )
+        linings = pads * hole * use['bone']
+        formulas['silicone'] = sheet + wall - core + linings + seal - pads * pin
+    else:
+        seal = _cone(z['flange'], z['top'], r['gasket'], r['gasket'] - slope)
+        formulas |= {'sheet': sheet, 'body': wall + seal - pads * pin}
+        low, up, gap = z['flange'] - 3.0, z['stop'], use['clearance']
+        formulas['retainer'] = (
+            (math.pi * r['flange'] ** 2 - screw) * (up - low)
+            - math.pi * (r['bore'] + gap) ** 2 * 3.0
+            - math.pi * (r['gasket'] + 1.0) ** 2 * (up - z['flange'])
+        )
+    for name, volume in formulas.items():
+        yield name, parts[name].solid.volume() / volume - 1.0
+
+
+def overlaps(made: Plan, parts: Mapping[str, Part]) -> list[str]:
+    """Return pairs that overlap in the mould or in the foot, but for the seal that is squeezed."""
+    z, r = made.z, made.r
+    found = []
+    for group in (moulded(parts), assembled(parts)):
+        for index, one in enumerate(group):
+            for other in group[index + 1 :]:
+                shared = (one.solid ^ other.solid).volume()
+                if other.name == 'cap' and one.name in ('silicone', 'body'):
+                    shared = _beside_the_seal(made, shared)
+                if abs(shared) > _EMPTY:
+                    found.append(f'{one.name} and {other.name} overlap by {shared:.3g} mm³')
+    return found
+
+
+def _beside_the_seal(made: Plan, shared: float) -> float:
+    """Return what cap and silicone share, mm³, if it is not the squeezed seal, and else 0."""
+    z, r = made.z, made.r
+    low = z['top'] if made.process == 'large' else z['flange']
+    slope = math.tan(math.radians(made.set['draft']))
+    share = (z['land'] - low) / (z['face'] - low)
+    squeezed = _cone(z['land'], z['face'], r['gasket'] - share * slope, r['gasket'] - slope)
+    squeezed -= math.pi * r['plenum'] ** 2 * (z['face'] - z['land'])
+    return 0.0 if abs(shared / squeezed - 1.0) < _OFF else shared - squeezed
+
+
+def undercuts(parts: Mapping[str, Part]) -> list[str]:
+    """Return the parts that meet what they come off while they are drawn off, in 11 steps."""
+    found, left = [], moulded(parts)
+    for name in ('lid', 'spacer', 'ring', 'inner mould'):
+        part = parts[name]
+        left = [each for each in left if each.name != name]
+        stays = [each for each in left if name != 'inner mould' or each.name != 'ring']
+        for step in np.geomspace(1e-2, 30.0, 11):
+            moved = part.solid.translate((0.0, 0.0, part.leaves * float(step)))
+            if sum((moved ^ each.solid).volume() for each in stays) > _EMPTY:
+                found.append(f'{name} meets what it comes off after {step:.2g} mm')
+                break
+    return found
+
+
+def thicknesses(made: Plan, parts: Mapping[str, Part]) -> list[str]:
+    """Return the pads whose sheet is more than 1 % off."""
+    cast = parts['silicone' if made.process == 'large' else 'sheet'].solid
+    kind, radius = type(cast), 0.8 * made.r['pad']
+    found = []
+    for number, (x, y) in enumerate(made.places.tolist()):
+        column = kind.cylinder(made.z['face'] + 1.0, radius, radius, 24).translate((x, y, -0.5))
+        area = column.slice(0.1).area()
+        thick = (column ^ cast).volume() / area
+        if abs(thick / made.z['sheet'] - 1.0) > 0.01:
+            found.append(f'the sheet of pad {number} is {thick:.4g} mm')
+    return found
+
+
+def leaks(made: Plan, parts: Mapping[str, Part], voxel: float) -> list[str]:
+    """Return pads that no air reaches from the inlet, and whether it gets out."""
+    from scipy.ndimage import label
+
+    solids = [part.solid for part in assembled(parts)]
+    z = made.z
+    outer = made.r['flange'] + 3.0 * voxel
+    grid = np.arange(-outer, outer + voxel, voxel)
+    low = min(0.25 * z['sheet'], voxel)
+    levels = [
+        -0.5 * voxel,
+        low,
+        0.75 * z['sheet'],
+        *np.arange(z['sheet'] + 0.2 * voxel, z['cap'], voxel),
+    ]
+    filled = np.array([_filled(solids, level, grid) for level in levels])
+    # A lid on the inlet, so that the air has no way out there.
+    filled[-1] = True
+    open_, _ = label(~filled)
+    middle = len(grid) // 2
+    inlet = open_[-2, middle, middle]
+    if not inlet:
+        return ['the inlet is closed']
+    index = np.clip(np.rint((made.places + outer) / voxel).astype(int), 0, len(grid) - 1)
+    reached = open_[3, index[:, 1], index[:, 0]] == inlet
+    found = [f'no air reaches pad {number}' for number in np.flatnonzero(~reached)]
+    return found + ['air gets out'] * bool(open_[0, 0, 0] == inlet)
+
+
+def _filled(solids: Sequence[Solid], level: float, grid: Array) -> Array:
+    """Return which points of a square grid at a height are inside one of the solids."""
+    inside = np.zeros((len(grid), len(grid)), bool)
+    points = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+    for solid in solids:
+        section = solid.slice(level)
+        odd = np.zeros(len(points), bool)
+        for polygon in section.to_polygons():
+            odd ^= Path(polygon).contains_points(points)
+        inside |= odd.reshape(inside.shape)
+    return inside
+
+
+# --- feet ------------------------------------------------------------------------------------------
+
+
+def random_feet(count: int, seed: int) -> Iterator[Foot]:
+    """Yield feet of random pads and silicones, on soles from too small to twice as large."""
+    rng = np.random.default_rng(seed)
+    start, materials = Foot.load('large37'), names('materials')
+    for number in range(count):
+        radius = float(np.exp(rng.uniform(math.log(0.3e-3), math.log(3e-3))))
+        pads = int(np.exp(rng.uniform(0.0, math.log(250.0))))
+        room = (2.6 * radius + 0.8e-3) * reach_of(hexagonal(pads)) + radius + edge_of(radius)
+        silicones = rng.choice(materials, 2, replace=False).tolist()
+        thickness = radius * float(rng.uniform(0.1, 0.6))
+        pad = Pad.of(Material.load(silicones[0]), radius, thickness)
+        yield replace(
+            start,
+            source=f'random {number}',
+            pad=pad,
+            pads=pads,
+            sole_radius=float(rng.uniform(0.9, 1.5)) * max(room, 3e-3),
+            sole_thickness=float(rng.uniform(3e-3, 10e-3)),
+            ceiling=max(0.6 * _end(pad), 1.1e3),
+            limit='flattening',
+            silicones=tuple(silicones),
+        )
+
+
+def _end(pad: Pad) -> float:
+    from ros_pad.contact.limits import largest_pressure
+
+    return largest_pressure(pad)
+
+
+def judged(foot: Foot) -> dict[str, Any]:
+    """Return the verdict on a foot: refused with reasons, or made with faults."""
+    start = time.perf_counter()
+    try:
+        made = plan(foot)
+    except InvalidInput as error:
+        return {'foot': foot.source, 'refused': str(error)}
+    parts = build(made)
+    spent = time.perf_counter() - start
+    wrong = faults(made, parts)
+    return {'foot': foot.source, 'process': made.process, 'faults': wrong, 'build_s': spent}
+
+
+def sliced(part: Part) -> dict[str, str]:
+    """Return layers, time and mass of a part by PrusaSlicer, as it tells them."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, code = pathlib.Path(folder) / 'part.stl', pathlib.Path(folder) / 'part.gcode'
+        path.write_bytes(stl(as_printed(part)))
+        done = subprocess.run(
+            [
+                'prusa-slicer',
+                '--export-gcode',
+                '--layer-height',
+                '0.2',
+                '--filament-density',
+                '1.04',
+            ]
+            + ['--bed-shape', '0x0,250x0,250x210,0x210', '--output', str(code), str(path)],
+            capture_output=True,
+            text=True,
+        )
+        if done.returncode:
+            return {'error': done.stderr.strip() or done.stdout.strip()}
+        text = code.read_text()
+    taken = re.search(r'estimated printing time \(normal mode\) = (.*)', text)
+    grams = re.search(r'filament used \[g\] = (.*)', text)
+    return {
+        'layers': str(text.count(';LAYER_CHANGE')),
+        'time': taken[1] if taken else '',
+        'grams': grams[1] if grams else '',
+    }
+
+
+def main(words: Sequence[str]) -> int:
+    """Judge the feet; print a table of all parts, and of what is wrong."""
+    part = command.parser('moulds', __doc__)
+    command.add_count(part, '--random', 50, 'number of random feet', 0)
+    command.add_count(part, '--seed', 3301, 'seed of the random feet', 0)
+    options = part.parse_args(words)
+    found: dict[str, Any] = {'parts': [], 'feet': []}
+    with bar('judging', 2.0 * len(FEET) + options.random, 'feet') as progress:
+        done = 0
+        for name in FEET:
+            whole = plan(Foot.load(name))
+            for made in (whole, test_piece(whole)):
+                parts = build(made)
+                found['feet'].append({'foot': made.foot.source, 'faults': faults(made, parts)})
+                found['parts'] += [
+                    _row(made, each) for each in parts.values() if each.made != 'air'
+                ]
+                progress(done := done + 1)
+        for foot in random_feet(options.random, options.seed):
+            found['feet'].append(judged(foot))
+            progress(done := done + 1)
+    if options.json:
+        print(json.dumps(found))
+        return 0
+    rows = [[str(value) for value in row.values()] for row in found['parts']]
+    print_table(list(found['parts'][0]), rows, 3)
+    for foot in found['feet']:
+        print(foot['foot'], foot.get('refused') or foot['faults'] or 'no fault', sep=': ')
+    refused = sum('refused' in foot for foot in found['feet'])
+    wrong = sum(bool(foot.get('faults')) for foot in found['feet'])
+    print(f'{len(found["feet"])} feet: {refused} refused, {wrong} with faults')
+    return 1 if wrong else 0
+
+
+def _row(made: Plan, part: Part) -> dict[str, Any]:
+    row = {
+        'foot': made.foot.source,
+        'part': part.name,
+        'of': part.made,
+        'triangles': part.solid.num_tri(),
+        'cm3': round(1e-3 * part.solid.volume(), 3),
+        'closed': closed(part),
+    }
+    told = sliced(part) if part.made in PRINTED and shutil.which('prusa-slicer') else {}
+    return row | {'layers': '', 'time': '', 'grams': ''} | told
