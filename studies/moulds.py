@@ -3,8 +3,8 @@
 
 Parts are judged closed by trimesh and, where it is installed, by admesh; volumes by formulas of
 circles; what is put together overlaps nowhere but where it is squeezed; moulds come off without
-undercut; a flood fill of voxels leads from the inlet to every pad and nowhere else; the sheet under
-every pad is as thick as it was asked. With prusa-slicer (FDM, 0.2 mm) also layers, time and mass.
+undercut; a flood fill of voxels leads from the inlet to every pad and nowhere else; every sheet
+is as thick as it was asked. With prusa-slicer (FDM, 0.2 mm) also layers, time and mass.
 
 For example:
   python -m studies moulds --random 50
@@ -26,7 +26,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from matplotlib.path import Path
 
 from ros_pad.commands.command import print_table
 from ros_pad.commands.progress import bar
@@ -47,7 +46,7 @@ _OFF = 0.01  # share by which a volume may be off its formula: chords of circles
 _EMPTY = 1e-3  # mm³ of overlap that is rounding
 
 
-# --- judges ----------------------------------------------------------------------------------------
+# --- judges --------------------------------------------------------------------------------------
 
 
 def faults(made: Plan, parts: Mapping[str, Part], voxel: float | None = None) -> list[str]:
@@ -57,15 +56,15 @@ def faults(made: Plan, parts: Mapping[str, Part], voxel: float | None = None) ->
     found += overlaps(made, parts)
     found += undercuts(parts)
     found += thicknesses(made, parts)
-    return found + leaks(made, parts, voxel or max(0.3 * made.r['pad'], 0.05))
+    return found + leaks(made, parts, voxel or min(max(0.3 * made.r['pad'], 0.05), 0.5))
 
 
 def closed(part: Part) -> bool:
-    """Return whether trimesh and admesh find the part closed, and all its faces turned outwards."""
+    """Return whether trimesh and admesh find the part closed, its faces turned outwards."""
     import trimesh
 
     data = stl(as_printed(part))
-    mesh = trimesh.load(io.BytesIO(data), file_type='stl')
+    mesh: Any = trimesh.load(io.BytesIO(data), file_type='stl')
     good = mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0
     if not shutil.which('admesh'):
         return bool(good)
@@ -87,34 +86,59 @@ def _cone(low: float, high: float, start: float, end: float) -> float:
 def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]]:
     """Yield parts and how far their volumes are off the formulas of circles, as a share."""
     z, r, use, pads = made.z, made.r, made.set, made.foot.pads
-    slope = math.tan(math.radians(use['draft']))
-    pin = _cone(z['sheet'], z['face'], r['pad'], r['root'])
-    sheet = math.pi * r['sole'] ** 2 * z['sheet']
+    slope, gap = math.tan(math.radians(use['draft'])), use['clearance']
+
+    def disc(radius: float, low: float, high: float) -> float:
+        return _cone(low, high, radius, radius)
+
+    large = made.process == 'large'
+    seal = _cone(0.0, 1.0 if large else 2.0, r['gasket'], r['gasket'] - slope)
     wall = _cone(z['sheet'], z['flange'], r['sole'], r['bore'])
-    screw = math.pi * r['screw'] ** 2 * made.screws
+    pins = pads * _cone(z['sheet'], z['face'], r['pad'], r['root'])
+    pegs, sockets = 3.0 * disc(1.5, 0.0, 3.0), 3.0 * disc(1.5 + gap, 0.0, 3.5)
+    mounts = use['mount_holes'] * disc(0.5 * use['mount_hole'], 0.0, 4.5) * (pads > 1)
+    vents = 12.0 * 0.3 * 2.5  # up to the groove
+    hollow = disc(r['flange'] + gap if large else r['gasket'], z['flange'], z['top'])
     formulas = {
-        'air': pads * pin
-        + math.pi * r['plenum'] ** 2 * (z['roof'] - z['face'])
-        + math.pi * (0.5 * use['fitting']) ** 2 * (z['cap'] - z['roof'])
+        'lid': disc(r['outer'], -4.0, 0.0) + pegs + 3.0 * disc(1.5, 0.0, z['sheet']),
+        'spacer': disc(r['outer'], 0.0, z['sheet'])
+        - disc(r['sole'], 0.0, z['sheet'])
+        - 3.0 * disc(1.5 + gap, 0.0, z['sheet']),
+        'ring': disc(r['outer'], z['sheet'], z['top'])
+        - wall
+        - hollow
+        - vents
+        - 2.0 * sockets
+        + disc(r['sole'] + 2.5, 0.0, 1.0)
+        - disc(r['sole'] + 4.0, 0.0, 1.0),
+        'inner mould': disc(r['outer'], z['top'], z['face'] + 5.0) + pins + pegs,
+        'cap': disc(r['flange'], z['stop'], z['cap'])
+        - disc(r['plenum'], z['land'], z['roof'])
+        - disc(0.5 * use['fitting'], z['roof'], z['cap'])
+        - made.screws * disc(r['screw'], z['stop'], z['cap'])
+        - mounts
+        - (disc(r['gasket'] + 1.0, z['stop'], z['land']) if large else 0.0),
+        'air': pins
+        + disc(r['plenum'], z['face'], z['roof'])
+        + disc(0.5 * use['fitting'], z['roof'], z['cap']),
     }
-    if made.process == 'large':
-        flange = z['top'] - z['flange']
-        hole = math.pi * r['hole'] ** 2
-        seal = _cone(z['top'], z['face'], r['gasket'], r['gasket'] - slope)
-        core = math.pi * r['bone'] ** 2 * (z['flange'] - z['bone'])
-        formulas['bone'] = (
-            core + (math.pi * r['flange'] ** 2 - screw) * flange - pads * hole * use['bone']
-        )
-        linings = pads * hole * use['bone']
-        formulas['silicone'] = sheet + wall - core + linings + seal - pads * pin
+    sheet = disc(r['sole'], 0.0, z['sheet'])
+    if large:
+        core = disc(r['bone'], z['bone'], z['flange'])
+        holes = pads * disc(r['hole'], z['bone'], z['top'])
+        screws = made.screws * disc(r['screw'], z['flange'], z['top'])
+        formulas['bone'] = core + disc(r['flange'], z['flange'], z['top']) - screws - holes
+        formulas['silicone'] = sheet + wall - core + holes + seal - pins
+        formulas['inner mould'] += 3.0 * disc(r['screw'] - 0.5 * gap, z['flange'] + 0.5, z['face'])
+        formulas['inner mould'] -= seal
     else:
-        seal = _cone(z['flange'], z['top'], r['gasket'], r['gasket'] - slope)
-        formulas |= {'sheet': sheet, 'body': wall + seal - pads * pin}
-        low, up, gap = z['flange'] - 3.0, z['stop'], use['clearance']
+        low = z['flange'] - 3.0
+        formulas |= {'sheet': sheet, 'body': wall + seal - pins}
         formulas['retainer'] = (
-            (math.pi * r['flange'] ** 2 - screw) * (up - low)
-            - math.pi * (r['bore'] + gap) ** 2 * 3.0
-            - math.pi * (r['gasket'] + 1.0) ** 2 * (up - z['flange'])
+            disc(r['flange'], low, z['stop'])
+            - made.screws * disc(r['screw'], low, z['stop'])
+            - disc(r['bore'] + gap, low, z['flange'])
+            - disc(r['gasket'] + 1.0, z['flange'], z['stop'])
         )
     for name, volume in formulas.items():
         yield name, parts[name].solid.volume() / volume - 1.0
@@ -122,7 +146,6 @@ def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]
 
 def overlaps(made: Plan, parts: Mapping[str, Part]) -> list[str]:
     """Return pairs that overlap in the mould or in the foot, but for the seal that is squeezed."""
-    z, r = made.z, made.r
     found = []
     for group in (moulded(parts), assembled(parts)):
         for index, one in enumerate(group):
@@ -148,14 +171,17 @@ def _beside_the_seal(made: Plan, shared: float) -> float:
 
 def undercuts(parts: Mapping[str, Part]) -> list[str]:
     """Return the parts that meet what they come off while they are drawn off, in 11 steps."""
-    found, left = [], moulded(parts)
+    found = []
+    cast = [parts[name].solid for name in ('bone', 'silicone', 'body', 'sheet') if name in parts]
+    pegs = {'ring': 'inner mould', 'lid': 'ring', 'spacer': 'ring'}
     for name in ('lid', 'spacer', 'ring', 'inner mould'):
-        part = parts[name]
-        left = [each for each in left if each.name != name]
-        stays = [each for each in left if name != 'inner mould' or each.name != 'ring']
+        part, stays = (
+            parts[name],
+            [*cast, *(parts[each].solid for each in [pegs.get(name)] if each)],
+        )
         for step in np.geomspace(1e-2, 30.0, 11):
             moved = part.solid.translate((0.0, 0.0, part.leaves * float(step)))
-            if sum((moved ^ each.solid).volume() for each in stays) > _EMPTY:
+            if sum((moved ^ each).volume() for each in stays) > _EMPTY:
                 found.append(f'{name} meets what it comes off after {step:.2g} mm')
                 break
     return found
@@ -165,13 +191,14 @@ def thicknesses(made: Plan, parts: Mapping[str, Part]) -> list[str]:
     """Return the pads whose sheet is more than 1 % off."""
     cast = parts['silicone' if made.process == 'large' else 'sheet'].solid
     kind, radius = type(cast), 0.8 * made.r['pad']
-    found = []
-    for number, (x, y) in enumerate(made.places.tolist()):
-        column = kind.cylinder(made.z['face'] + 1.0, radius, radius, 24).translate((x, y, -0.5))
-        area = column.slice(0.1).area()
-        thick = (column ^ cast).volume() / area
-        if abs(thick / made.z['sheet'] - 1.0) > 0.01:
-            found.append(f'the sheet of pad {number} is {thick:.4g} mm')
+    column = kind.cylinder(made.z['face'] + 1.0, radius, radius, 24).translate((0.0, 0.0, -0.5))
+    every = kind.compose([column.translate((x, y, 0.0)) for x, y in made.places.tolist()])
+    area = column.slice(0.1).area()
+    thick = [piece.volume() / area for piece in (every ^ cast).decompose()]
+    off = [each for each in thick if abs(each / made.z['sheet'] - 1.0) > 0.01]
+    found = [f'a sheet is {each:.4g} mm' for each in off]
+    if len(thick) != made.foot.pads:
+        found.append(f'{len(thick)} sheets under {made.foot.pads} pads')
     return found
 
 
@@ -207,17 +234,24 @@ def leaks(made: Plan, parts: Mapping[str, Part], voxel: float) -> list[str]:
 def _filled(solids: Sequence[Solid], level: float, grid: Array) -> Array:
     """Return which points of a square grid at a height are inside one of the solids."""
     inside = np.zeros((len(grid), len(grid)), bool)
-    points = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
     for solid in solids:
-        section = solid.slice(level)
-        odd = np.zeros(len(points), bool)
-        for polygon in section.to_polygons():
-            odd ^= Path(polygon).contains_points(points)
-        inside |= odd.reshape(inside.shape)
+        # Even-odd rule along the rows of the grid.
+        turns = np.zeros((len(grid), len(grid) + 1), int)
+        for polygon in solid.slice(level).to_polygons():
+            ends = np.roll(polygon, -1, axis=0)
+            low, high = (
+                np.minimum(polygon[:, 1], ends[:, 1]),
+                np.maximum(polygon[:, 1], ends[:, 1]),
+            )
+            row, edge = np.nonzero((grid[:, None] >= low) & (grid[:, None] < high))
+            (x, y), (dx, dy) = polygon[edge].T, (ends - polygon)[edge].T
+            column = np.searchsorted(grid, x + (grid[row] - y) * dx / dy)
+            np.add.at(turns, (row, column), 1)
+        inside |= turns[:, :-1].cumsum(axis=1) % 2 == 1
     return inside
 
 
-# --- feet ------------------------------------------------------------------------------------------
+# --- feet ----------------------------------------------------------------------------------------
 
 
 def random_feet(count: int, seed: int) -> Iterator[Foot]:
@@ -263,21 +297,19 @@ def judged(foot: Foot) -> dict[str, Any]:
     return {'foot': foot.source, 'process': made.process, 'faults': wrong, 'build_s': spent}
 
 
+_SLICER = (
+    *('prusa-slicer', '--export-gcode', '--layer-height', '0.2', '--filament-density', '1.04'),
+    *('--bed-shape', '0x0,250x0,250x210,0x210'),
+)
+
+
 def sliced(part: Part) -> dict[str, str]:
     """Return layers, time and mass of a part by PrusaSlicer, as it tells them."""
     with tempfile.TemporaryDirectory() as folder:
         path, code = pathlib.Path(folder) / 'part.stl', pathlib.Path(folder) / 'part.gcode'
         path.write_bytes(stl(as_printed(part)))
         done = subprocess.run(
-            [
-                'prusa-slicer',
-                '--export-gcode',
-                '--layer-height',
-                '0.2',
-                '--filament-density',
-                '1.04',
-            ]
-            + ['--bed-shape', '0x0,250x0,250x210,0x210', '--output', str(code), str(path)],
+            [*_SLICER, '--output', str(code), str(path)],
             capture_output=True,
             text=True,
         )

@@ -22,10 +22,11 @@ from ros_pad import configuration
 from ros_pad.commands.command import FILE, Commands, add_command, print_table
 from ros_pad.commands.folder import check_picture
 from ros_pad.configuration import number
-from ros_pad.contact import Design, Foot, Material, design
+from ros_pad.contact import Design, Foot, Material, Pad, design
 from ros_pad.contact.design import CELL, Candidate, candidates
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, criteria, resized
 from ros_pad.errors import InvalidInput
+from ros_pad.making.plan import verdict
 
 USUAL = 'large37'  # the foot whose pads and ceiling are used where none is given
 RADII = (0.3e-3, 0.4e-3, 0.5e-3, 0.6e-3, 0.8e-3, 1e-3, 1.25e-3, 1.5e-3, 1.75e-3, 2e-3, 2.5e-3)
@@ -121,7 +122,8 @@ def _of_stiffness(options: argparse.Namespace, foot: Foot, area: float) -> dict[
             f' N/m, margin {first.margin:g}, at up to {first.ceiling:.0f} Pa\n'
         )
         _print_rows(_OF_DESIGNS, [*named, *({'name': 'other radius'} | row for row in rows)])
-    return {'designs': named, 'radii': rows, 'says': list(advice(first))}
+    says = [*advice(first), _cast(foot, first.pad, first.pads, area, first.ceiling)]
+    return {'designs': named, 'radii': rows, 'says': says}
 
 
 def _of_materials(options: argparse.Namespace, foot: Foot, area: float) -> dict[str, Any]:
@@ -181,7 +183,27 @@ def _of_materials(options: argparse.Namespace, foot: Foot, area: float) -> dict[
             'Flattening is the end of the model: the pad of the thesis carried 0.33, 0.57 and 0.67'
             ' of it at 65, 75 and 85 kPa.'
         )
+    first = found[0]
+    says.append(_cast(foot, first.pad, first.pads, area, first.largest_pressure.low))
     return {'load_n': options.load, 'area_m2': area} | rules | {'candidates': rows, 'says': says}
+
+
+def _cast(foot: Foot, pad: Pad, pads: int, area: float, ceiling: float) -> str:
+    """Return whether a design can be cast, with the other properties of a foot."""
+    silicones = (
+        foot.silicones if pad.material is None else (pad.material.name, *foot.silicones[1:])
+    )
+    made = replace(
+        foot,
+        source='this design',
+        pad=pad,
+        pads=pads,
+        sole_radius=math.sqrt(area / math.pi),
+        ceiling=min(foot.ceiling, 0.999 * ceiling),
+        limit='flattening',
+        silicones=silicones,
+    )
+    return verdict(made)
 
 
 def candidate_values(each: Candidate) -> dict[str, Any]:

@@ -20,7 +20,6 @@ For example:
 from __future__ import annotations
 
 import argparse
-import json
 import pathlib
 import textwrap
 from typing import Any
@@ -49,7 +48,6 @@ def add(commands: Commands) -> None:
     add('--set', nargs='+', default=[], metavar='NAME=VALUE', help='settings, see above')
     add('--out', help='folder to write (default: FOOT_moulds here)', **FOLDER)
     add('--force', action='store_true', help='replace existing files')
-    add('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,22 +56,18 @@ def run(options: argparse.Namespace) -> int:
     made = plan(foot, options.process, _given(options.set))
     folder = options.out or pathlib.Path(f'{pathlib.Path(options.foot).stem}_moulds')
     from ros_pad.making import build
+    from ros_pad.making.expect import ceiling_of
     from ros_pad.reports import moulds
     from ros_pad.reports.files import save
 
-    with bar('making moulds', 7.0, 'steps') as progress:
+    with bar('making moulds', 5.0, 'steps') as progress:
         found = moulds.files(made, progress)
     for name in found:
         refuse(folder / name, options.force)
     for name, data in found.items():
         save(folder / name, data)
-    if options.json:
-        print(
-            json.dumps(moulds.dimensions(made) | {'files': sorted(found), 'folder': str(folder)})
-        )
-        return 0
     print_table(moulds.HEADS, moulds.rows(build(made)), 3)
-    print(f'\nceiling to set: {moulds.ceiling_of(made):.0f} Pa gauge')
+    print(f'\nceiling to set: {ceiling_of(made):.0f} Pa gauge')
     print(f'page to work by: {folder / "making.html"}')
     return 0
 

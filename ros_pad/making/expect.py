@@ -11,6 +11,7 @@ from typing import NamedTuple
 from ros_pad.contact import Foot, Material, Pad, force_limit, inflate
 from ros_pad.contact.foot_file import foot_text
 from ros_pad.contact.limits import DEFAULT_CRITERION, largest_pressure
+from ros_pad.contact.material import Casting
 from ros_pad.contact.pad import with_constant
 from ros_pad.contact.resistance import DOMED
 from ros_pad.making.plan import Plan
@@ -20,64 +21,35 @@ DENSITY = {'filament': 1040.0, 'resin': 1150.0, 'film': 1380.0}
 """Density of printed ABS, cured resin and polyester film, kg/m³."""
 
 
-class Expected(NamedTuple):
-    """What a thickness of the sheet means.
-
-    Attributes
-    ----------
-    thickness : float
-        Of the sheet, m.
-    stiffness : float
-        Of a pad, N/m.
-    pressure : float
-        For the dome that the foot as designed has at 0.85 of its ceiling, Pa.
-    height : float
-        Of the dome at that pressure of the foot as designed, m; NaN above the end of the model.
-    force_limit : float
-        Of all pads at the ceiling, N; NaN above the end of the model.
-    largest : float
-        Pressure at which a pad balloons or its model ends, Pa.
-    """
-
-    thickness: float
-    stiffness: float
-    pressure: float
-    height: float
-    force_limit: float
-    largest: float
-
-
 class Batch(NamedTuple):
     """What to weigh of a silicone: the mass that stays in the foot, and both parts, kg."""
 
     material: Material
+    casting: Casting
     mass: float
     mixed: float
 
 
-def expected(made: Plan) -> list[Expected]:
-    """Return what to expect of the thinnest, the designed and the thickest sheet."""
-    foot, off = made.foot, 1e-3 * made.set['tolerance']
+def expected(made: Plan) -> list[tuple[str, ...]]:
+    """Return what to expect of the thinnest, the designed and the thickest sheet, as texts.
+
+    The first row has the heads. Above the end of the model a pad balloons, or nothing is known.
+    """
+    foot, pressure = made.foot, DOMED * made.foot.ceiling
     # A limit that was measured holds for its own pad alone.
     criterion = DEFAULT_CRITERION if foot.limit == 'measured' else foot.limit
-    rows = []
-    for thickness in (_sheet(foot) - off, _sheet(foot), _sheet(foot) + off):
+    head = 'sheet, mm', 'stiffness, N/m', 'for the same dome, Pa', f'dome at {pressure:.0f} Pa, mm'
+    rows = [(*head, f'limit at {foot.ceiling:.0f} Pa, N', 'balloons or model ends, Pa')]
+    for off in (-1e-3, 0.0, 1e-3):
+        thickness = _sheet(foot) + off * made.set['tolerance']
         pad, share = _with_sheet(foot.pad, thickness), thickness / _sheet(foot)
         # Arrays have NaN above the end of a model.
-        height = float(inflate(pad, [DOMED * foot.ceiling]).height[0])
-        limit = float(force_limit(pad, [foot.ceiling], criterion)[0])
+        height = 1e3 * float(inflate(pad, [pressure]).height[0])
+        limit = foot.pads * float(force_limit(pad, [foot.ceiling], criterion)[0])
+        values = ('balloons' if math.isnan(each) else f'{each:.3g}' for each in (height, limit))
         # Of one shape, tension and pressure are in proportion to the thickness.
-        pressure = share * DOMED * foot.ceiling
-        rows.append(
-            Expected(
-                thickness,
-                pad.stiffness,
-                pressure,
-                height,
-                foot.pads * limit,
-                largest_pressure(pad),
-            )
-        )
+        first = f'{1e3 * thickness:.3f}', f'{pad.stiffness:.3g}', f'{share * pressure:.0f}'
+        rows.append((*first, *values, f'{largest_pressure(pad):.0f}'))
     return rows
 
 
@@ -107,13 +79,13 @@ def ceiling_of(made: Plan) -> float:
 
 
 def batches(made: Plan, parts: Mapping[str, Part]) -> list[Batch]:
-    """Return what to weigh of each silicone, with a fifth or 5 g of waste."""
+    """Return what to weigh of sheet and body, once if they are one, with waste: a fifth or 5 g."""
     rows = []
     for material in dict.fromkeys((made.sheet, made.body)):
         assert material.casting is not None
         volume = sum(part.solid.volume() for part in parts.values() if part.made == material.name)
         mass = 1e-9 * volume * material.casting.density
-        rows.append(Batch(material, mass, max(1.2 * mass, mass + 5e-3)))
+        rows.append(Batch(material, material.casting, mass, max(1.2 * mass, mass + 5e-3)))
     return rows
 
 

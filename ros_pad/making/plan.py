@@ -178,6 +178,17 @@ def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None
     return made
 
 
+def verdict(foot: Foot) -> str:
+    """Return whether a foot can be made, and if not why not, as a sentence."""
+    try:
+        made = plan(foot)
+    except InvalidInput as error:
+        return f'Not to be cast: {error}.'
+    return (
+        f'It can be cast ({made.process} process, {made.pitch:.2f} mm from pad to pad): pad mould.'
+    )
+
+
 def _silicones(foot: Foot, process: str) -> tuple[Material, Material]:
     names = foot.silicones
     own = foot.pad.material.name if foot.pad.material is not None else ''

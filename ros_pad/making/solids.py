@@ -69,7 +69,7 @@ class _Builder:
 
     def disc(self, radius: float, low: float, high: float, top: float | None = None) -> Solid:
         """Return a disc or cone about the z axis."""
-        sides = 8 * max(3, min(32, math.ceil(radius * 0.6 + 1.5)))
+        sides = 8 * max(4, min(32, math.ceil(radius * 0.6 + 1.5)))
         end = radius if top is None else top
         return self.kind.cylinder(high - low, radius, end, sides).translate((0.0, 0.0, low))
 
@@ -176,7 +176,7 @@ class _Builder:
         return self.disc(1.5 + self.made.set['clearance'], *ends)
 
     def ring(self) -> Solid:
-        """Return the wall of the mould: it stands on the plate, its face flush with the pins' ends."""
+        """Return the wall of the mould: its face is flush with the pins' ends."""
         z, r, gap = self.z, self.r, self.made.set['clearance']
         low, up = z['sheet'], z['flange']
         solid = self.disc(r['outer'], low, z['top'])

@@ -13,7 +13,9 @@ from ros_pad.contact import Foot
 from ros_pad.contact.foot_file import foot_text
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.errors import PadError
-from ros_pad.reports import explore, explore_drawings
+from ros_pad.making.files import zipped
+from ros_pad.making.plan import plan
+from ros_pad.reports import explore, explore_drawings, moulds
 from ros_pad.reports.explore import FIELDS, LIQUIDS, MEASURED, Explored, Field, Inputs
 from ros_pad.reports.style import BLUE, VERMILION
 
@@ -124,7 +126,8 @@ class Page:
                     f'<h1>Foot {html.escape(self._inputs["foot"].source)}</h1>', sanitize=False
                 )
                 self._status = ui.label().props('role=status')
-                ui.button('Foot file', on_click=self._export).props('outline no-caps dense')
+                for words, action in (('Foot file', self._export), ('Moulds', self._moulds)):
+                    ui.button(words, on_click=action).props('outline no-caps dense')
             with ui.element('section').classes('inputs').props('aria-label="Inputs"'):
                 for title, names in _GROUPS.items():
                     ui.html(f'<h2>{title}</h2>', sanitize=False)
@@ -237,13 +240,32 @@ class Page:
         )
         self._status.set_text('')
 
-    async def _export(self) -> None:
-        """Download the foot of the present inputs."""
+    async def _foot(self) -> Foot | None:
+        """Return the foot of the present inputs, or tell that there is none."""
         foot = (await asyncio.to_thread(explore.explore, self._inputs)).foot
         if foot is None:
             self._ui.notify('There is no foot: mend what is marked at the inputs', type='warning')
+        return foot
+
+    async def _export(self) -> None:
+        """Download the foot of the present inputs."""
+        if foot := await self._foot():
+            self._ui.download.content(foot_file(foot), 'my_foot.yaml')
+
+    async def _moulds(self) -> None:
+        """Download the files that make the foot of the present inputs."""
+        if not (foot := await self._foot()):
             return
-        self._ui.download.content(foot_file(foot), 'my_foot.yaml')
+        self._status.set_text('making moulds …')
+        try:
+            data = await asyncio.to_thread(moulds_of, foot)
+        except PadError as error:
+            self._ui.notify(
+                str(error), type='warning', multi_line=True, timeout=0, close_button='OK'
+            )
+        else:
+            self._ui.download.content(data, 'my_foot_moulds.zip')
+        self._status.set_text('')
 
 
 def _si(field: Field, number: float | None) -> float | None:
@@ -264,6 +286,12 @@ def foot_file(foot: Foot) -> str:
     )
     comments = {'stiffness': 'as chosen', 'thickness': 'as chosen'}
     return foot_text(foot, f'{foot.source}, explored', head, comments)
+
+
+def moulds_of(foot: Foot) -> bytes:
+    """Return what ``pad mould`` writes for a foot, and its foot file, as a ZIP."""
+    made = moulds.files(plan(foot))
+    return zipped(made | {'my_foot.yaml': foot_file(foot).encode()})
 
 
 def answer(inputs: Inputs) -> tuple[Explored, str, str]:

@@ -17,7 +17,7 @@ from matplotlib.path import Path
 from ros_pad.contact.pad import Array
 from ros_pad.making import Part, Plan
 from ros_pad.making.solids import Solid
-from ros_pad.reports.style import BLACK, GREEN, PALE, STANCE, VERMILION, WET, Drawn
+from ros_pad.reports.style import BLACK, PALE, VERMILION, Drawn
 
 _LOOKS = {
     **{'lid': '#C9CED6', 'ring': '#9FB0C3', 'inner mould': '#E8B04B', 'bone': '#F4F1E8'},
@@ -42,7 +42,7 @@ def assembled(parts: Mapping[str, Part]) -> list[Part]:
     return [parts[name] for name in order if name in parts]
 
 
-# --- sections --------------------------------------------------------------------------------------
+# --- sections ------------------------------------------------------------------------------------
 
 
 def drawing(made: Plan, parts: Mapping[str, Part]) -> Figure:
@@ -85,7 +85,7 @@ def drawing(made: Plan, parts: Mapping[str, Part]) -> Figure:
 _LEVELS = {'bone': 'bone', 'flange': 'flange', 'top': 'plate', 'face': 'roots of pins'}
 
 
-def _cut(axes: Axes, parts: Sequence[Part], title: str) -> None:
+def _cut(axes: Axes, parts: Sequence[Part], title: str, names: bool = True) -> None:
     """Draw the section of parts through the plane y = 0."""
     axes.set_title(title, fontweight='bold')
     axes.set_aspect('equal')
@@ -94,6 +94,8 @@ def _cut(axes: Axes, parts: Sequence[Part], title: str) -> None:
         # About x, so that z is drawn upwards.
         _fill(axes, part.solid.rotate((-90.0, 0.0, 0.0)).slice(0.0), part)
     axes.autoscale_view()
+    if not names:
+        return
     handles = [
         PathPatch(Path([(0, 0)]), facecolor=_colour(part), edgecolor=BLACK) for part in parts
     ]
@@ -151,10 +153,9 @@ def _pad(axes: Axes, made: Plan, parts: Mapping[str, Part]) -> None:
     x = float((row if len(row) else made.places)[:, 0].max())
     large = made.process == 'large'
     high = z['sheet'] + (1.9 if large else 1.2) * r['pad'] + (0.8 if large else 0.0)
-    _cut(axes, assembled(parts), 'One pad at the edge')
+    _cut(axes, assembled(parts), 'One pad at the edge', names=False)
     left, right = x - 2.6 * r['pad'], r['sole'] + 1.6 * r['pad']
     axes.set(xlim=(left, right), ylim=(-0.7 * r['pad'], high + 0.3 * r['pad']))
-    axes.get_legend().remove()
     mid = z['sheet'] + 0.25 * r['pad']
     _arrow(axes, (x - r['pad'], mid), (x + r['pad'], mid), f'chamber ⌀ {2.0 * r["pad"]:.2f}')
     side = r['sole'] + 0.3 * r['pad']
@@ -191,7 +192,7 @@ def _plan_view(axes: Axes, made: Plan, parts: Mapping[str, Part]) -> None:
     axes.set_xlim(-r['flange'] - 3.0, r['flange'] + 32.0)
 
 
-# --- what goes where -------------------------------------------------------------------------------
+# --- what goes where -----------------------------------------------------------------------------
 
 
 class _View(NamedTuple):
@@ -210,7 +211,7 @@ def _view(azimuth: float, height: float) -> _View:
 
 
 def exploded(made: Plan, parts: Mapping[str, Part]) -> Drawn:
-    """Return the mould as it is stacked to cast, sole up, and the foot as it is screwed together."""
+    """Return the mould as it is stacked to cast, and the foot as it is screwed together."""
     mould = [part for part in moulded(parts) if part.name not in ('silicone', 'body', 'sheet')]
     figure = Figure(figsize=(11.0, 8.5))
     for place, title, stack, turn in (
@@ -260,7 +261,7 @@ def _stack(axes: Axes, parts: Sequence[Part], turn: bool) -> None:
 
 
 def _triangles(solid: Solid, view: _View, colour: str) -> tuple[Array, Array]:
-    """Return the triangles that face the eye, far ones first, in the picture, and their colours."""
+    """Return the triangles that face the eye, far ones first, and their colours."""
     from matplotlib.colors import to_rgb
 
     size = solid.bounding_box()[3]
@@ -281,5 +282,7 @@ def _paint(axes: Axes, corners: Sequence[Array], colours: Sequence[Array]) -> No
     """Paint the parts one after the other, from below: each hides only what is below it."""
     for points, shades in zip(corners, colours, strict=True):
         axes.add_collection(
-            PolyCollection(points, facecolors=shades, edgecolors=shades, lw=0.8, rasterized=True)
+            PolyCollection(
+                list(points), facecolors=shades, edgecolors=shades, lw=0.8, rasterized=True
+            )
         )

@@ -6,24 +6,20 @@ from __future__ import annotations
 import csv
 import html
 import io
-import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import matplotlib
 
-from ros_pad.contact import Foot
 from ros_pad.contact.layout import edge_of
-from ros_pad.contact.resistance import DOMED
-from ros_pad.making import Part, Plan, build
-from ros_pad.making.expect import DENSITY, Batch, as_made, batches, ceiling_of, expected
+from ros_pad.making import Part, Plan, build, plan
+from ros_pad.making.expect import DENSITY, as_made, batches, ceiling_of, expected
 from ros_pad.making.files import dxf, stl, three_mf
-from ros_pad.making.plan import plan, process_of
 from ros_pad.making.solids import as_printed
 from ros_pad.pace import Progress
 from ros_pad.reports.mould_drawings import drawing, exploded
-from ros_pad.reports.page import heading, page, plain_table, section, table
+from ros_pad.reports.page import heading, page, plain_table, section, table, warning
 from ros_pad.reports.style import STYLE, rendered
 
 PRINTED = ('filament', 'resin')
@@ -37,143 +33,9 @@ _ON_BED = {
     'retainer': 'flat face down',
     'spacer': 'cut from film by spacer.dxf, not printed',
 }
-
-
-def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
-    """Return all files of a foot by name.
-
-    Parameters
-    ----------
-    made : Plan
-        The foot.
-    progress : callable
-        Is told how many of seven steps are done.
-
-    Raises
-    ------
-    InvalidInput
-        When its test piece cannot be made.
-    PadError
-        When manifold3d is not installed.
-    """
-    parts = build(made)
-    progress(1)
-    piece = test_piece(made)
-    found = _meshes(made, parts, '') | _meshes(piece, build(piece), 'test_piece/')
-    progress(2)
-    with matplotlib.rc_context(STYLE):
-        sheet, views = drawing(made, parts), exploded(made, parts)
-        progress(3)
-        found |= {f'drawing.{kind}': rendered(sheet, kind, dpi=150) for kind in ('svg', 'pdf')}
-        progress(5)
-        found['what_goes_where.png'] = rendered(views.figure, 'png', dpi=150)
-        progress(6)
-        texts = {
-            'making.html': page(
-                f'Making {made.foot.source}', _sections(made, parts, section(views))
-            ),
-            'parts.csv': _csv([HEADS, *rows(parts)]),
-            'measurements.csv': measurements(made),
-            'as_made.yaml': as_made(made, parts),
-            'dimensions.json': json.dumps(dimensions(made), indent=1),
-        }
-    return found | {name: text.encode() for name, text in texts.items()}
-
-
-def test_piece(made: Plan) -> Plan:
-    """Return one pad, cast in the same process, for the bench."""
-    foot = made.foot
-    least = foot.pad.radius + edge_of(foot.pad.radius) + 2e-3
-    single = replace(foot, pads=1, sole_radius=max(least, 6e-3), source=f'{foot.source}, one pad')
-    given = {name: value for name, value in made.given.items() if name != 'bone'}
-    return plan(single, made.process, given)
-
-
-def _meshes(made: Plan, parts: Mapping[str, Part], folder: str) -> dict[str, bytes]:
-    printed = [part for part in parts.values() if part.made in PRINTED]
-    found = {
-        f'{folder}{part.name.replace(" ", "_")}.stl': stl(as_printed(part)) for part in printed
-    }
-    found[f'{folder}printed.3mf'] = three_mf(printed)
-    holes = [(x, y, 1.5 + made.set['clearance']) for x, y in made.pegs(made.lid_angles)]
-    rings = [(0.0, 0.0, made.r['sole']), (0.0, 0.0, made.r['outer'])]
-    return found | {f'{folder}spacer.dxf': dxf([*rings, *holes]).encode()}
-
-
-def rows(parts: Mapping[str, Part]) -> list[list[str]]:
-    """Return the printed parts and the spacer as texts, under :data:`HEADS`."""
-    found = []
-    for part in parts.values():
-        if part.made not in DENSITY:
-            continue
-        box, volume = part.solid.bounding_box(), 1e-3 * part.solid.volume()
-        size = ' × '.join(f'{box[k + 3] - box[k]:.1f}' for k in range(3))
-        grams = f'{1e-3 * volume * DENSITY[part.made]:.1f}'
-        found.append(
-            [part.name, part.made, size, f'{volume:.2f}', grams, str(part.solid.num_tri()),
-             _ON_BED[part.name]]
-        )  # fmt: skip
-    return found
-
-
-def dimensions(made: Plan) -> dict[str, object]:
-    """Return the dimensions as plain values, mm."""
-    return {
-        'foot': made.foot.source,
-        'process': made.process,
-        'pitch_mm': made.pitch if math.isfinite(made.pitch) else None,
-        'heights_mm': made.z,
-        'radii_mm': made.r,
-        'screws': made.screws,
-        'peak_load_n': made.load,
-        'ceiling_pa': ceiling_of(made),
-        'settings_mm_n_degrees': made.set,
-    }
-
-
-def measurements(made: Plan) -> str:
-    """Return the table to fill at the bench, which ``pad calibrate`` reads."""
-    kpa = 1e-3 * ceiling_of(made)
-    lines = [
-        f'# One pad of {made.foot.source}. Fill in the heights (dial gauge) and the force limits (on',
-        '# a scale), delete rows without a value, then:',
-        '# pad calibrate measurements.csv --foot as_made.yaml --out my_foot.yaml',
-        'pressure [kPa], height [mm], force_limit [N]',
-        *(f'{share * kpa:.3g}, ,' for share in (0.4, 0.55, 0.7, 0.85, 0.95)),
-        *(f'{share * kpa:.3g}, ,' for share in (0.7, 0.85, 0.95)),
-    ]
-    return '\n'.join(lines) + '\n'
-
-
-def _csv(lines: Sequence[Sequence[str]]) -> str:
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator='\n').writerows(lines)
-    return stream.getvalue()
-
-
-# --- the page --------------------------------------------------------------------------------------
-
-
-def _sections(made: Plan, parts: Mapping[str, Part], views: str) -> Iterator[str]:
-    """Yield the parts of the page."""
-    foot, weigh = made.foot, batches(made, parts)
-    yield heading(f'Making {foot.source}', (f'{made.process} process', f'{foot.pads} pads'))
-    yield f'<p class="warning">{html.escape(_UNTRIED)}</p>'
-    yield views
-    yield '<h2>Parts to print and to cut</h2>'
-    yield table(HEADS, [[html.escape(cell) for cell in row] for row in rows(parts)], range(3, 6))
-    yield '<h2>Silicone</h2>'
-    yield table(_SILICONE, [_weighed(each) for each in weigh], range(1, 6))
-    yield '<h2>Work</h2>'
-    steps = _large(made, weigh) if made.process == 'large' else _small(made, weigh)
-    yield '<ol>' + ''.join(f'<li>{html.escape(step)}</li>' for step in steps) + '</ol>'
-    yield '<h2>What goes wrong</h2>' + plain_table(_FAULTS)
-    yield '<h2>What to expect</h2>' + _expectations(made)
-
-
 _UNTRIED = (
-    'No foot was made by these files yet: they were modelled, checked and sliced. Cast the test'
-    ' piece first.'
+    'No foot was made by these files yet: they were modelled, checked and sliced. Cast the test piece'
+    ' first.'
 )
 _SILICONE = (
     'silicone',
@@ -201,151 +63,194 @@ _FAULTS = (
     ),
     ('Sheet too thick all over', 'The lid was not pressed down, or flash lies under the spacer.'),
 )
+# Steps begin with a dash; names in braces are filled in by _work.
+_FIRST = """- Print the parts as listed: filament in layers of 0.2 mm or less, resin of 0.05 mm.
+- Cut the spacer from polyester film of {sheet:g} mm, or of films that add up to it. The sheet
+becomes as thick as this film: measure it with a micrometer.
+- Wash and post-cure the inner mould, then two thin coats of clear acrylic lacquer: resin can keep
+silicone from curing. Try a drop of the silicone on its back first.
+- Fit dry: the ring goes on the plate in one way only. With a dial gauge, the ends of the pins must
+be level with the ring's face within {off:g} mm. If they are lower, sand the face on glass; if
+higher, put paper under the ring.
+- Put release agent on plate, ring, lid and the ends of the pins, and nowhere else. Stick clear film
+on the lid: it makes the sole smooth.
+- Weigh {half_body:.2f} g of each part of {body} (scale of 0.01 g), mix for three minutes and degas.
+It must be poured within {pot_body:.0f} minutes.
+"""
+_MIDDLE = {
+    'large': """- Fill the recess of the plate and heap up {heap:.1f} g between the pins. Push the
+bone over the pins until it lies on the plate: silicone must come up around every pin. (From above
+it would not run down there in time.)
+- Set the ring, pour from one side until the pins are covered, and degas again.
+""",
+    'small': """- Set the ring, pour around the pins until they are covered, degas, lower the lid without
+the spacer from one side, weigh it down with 1 kg, and leave it for {cure_body:.0f} hours at 23 °C.
+- Take off the lid, and leave the body on its pins. Wipe the ends of the pins clean, and put release
+agent on them alone; clean the body with alcohol.
+- Weigh {half_sheet:.2f} g of each part of {sheet_of}, mix for three minutes and degas. It must be
+poured within {pot_sheet:.0f} minutes: over the body, and degas again.
+""",
+}
+_LAST = """- Lay the spacer on the ring, lower the lid from one side, weigh it down with 1 kg, and leave it
+for {cure_sheet:.0f} hours at 23 °C.
+- Take off lid and spacer, draw the ring off towards the sole, then the inner mould straight along
+its pins, slowly: air must get in, or suction tears the sheet. Trim the vents.
+- {close} with {screws} screws M{screw:g} until they touch: this squeezes the seal by a fifth.
+- Tap the hole of the cap to M5, screw in the fitting of the hose with sealant.
+- Under water at a tenth of the ceiling: no bubbles, and every pad rises. Then the test piece: fill
+measurements.csv at the bench, and run pad calibrate."""
+_CLOSE = {
+    'large': 'Screw the cap on the bone',
+    'small': 'Put the retainer over the sole up to the flange, and screw the cap on it',
+}
 
 
-def _weighed(each: Batch) -> list[str]:
-    casting, half = each.material.casting, f'{500.0 * each.mixed:.2f}'
-    assert casting is not None
-    return [
-        html.escape(each.material.name),
-        f'{1e3 * each.mass:.2f}',
-        half,
-        half,
-        f'{casting.pot_life / 60.0:.0f}',
-        f'{casting.cure_time / 3600.0:.0f}',
-        html.escape(f'{casting.mix}, at 23 °C; read the label. {casting.source}'),
-    ]
+def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
+    """Return all files of a foot by name.
+
+    Parameters
+    ----------
+    made : Plan
+        The foot.
+    progress : callable
+        Is told how many of five steps are done.
+
+    Raises
+    ------
+    InvalidInput
+        When its test piece cannot be made.
+    PadError
+        When manifold3d is not installed.
+    """
+    parts, piece = build(made), test_piece(made)
+    found = _meshes(made, parts, '') | _meshes(piece, build(piece), 'test_piece/')
+    progress(1)
+    with matplotlib.rc_context(STYLE):
+        sheet, views = drawing(made, parts), exploded(made, parts)
+        progress(2)
+        found |= {f'drawing.{kind}': rendered(sheet, kind, dpi=150) for kind in ('svg', 'pdf')}
+        progress(4)
+        texts = {
+            'making.html': _page(made, parts, section(views)),
+            'measurements.csv': measurements(made),
+            'as_made.yaml': as_made(made, parts),
+        }
+    listed = io.StringIO()
+    csv.writer(listed, lineterminator='\n').writerows([HEADS, *rows(parts)])
+    texts['parts.csv'] = listed.getvalue()
+    return found | {name: text.encode() for name, text in texts.items()}
 
 
-def _first(made: Plan) -> list[str]:
-    """Return the steps that both processes begin with."""
-    off, thick = made.set['tolerance'], made.z['sheet']
-    return [
-        'Print the parts as listed: filament in layers of 0.2 mm or less, resin of 0.05 mm.',
-        f'Cut the spacer from polyester film of {thick:g} mm, or of films that add up to it. The'
-        ' sheet becomes as thick as this film: measure it with a micrometer.',
-        'Wash and post-cure the inner mould, then two thin coats of clear acrylic lacquer: resin can'
-        ' keep silicone from curing. Try a drop of the silicone on its back first.',
-        'Fit dry: the ring goes on the plate in one way only. With a dial gauge, the ends of the pins'
-        f' must be level with the ring’s face within {off:g} mm. If they are lower, sand the face on'
-        ' glass; if higher, put paper under the ring.',
-        'Put release agent on plate, ring, lid and the ends of the pins, and nowhere else. Stick'
-        ' clear film on the lid: it makes the sole smooth.',
-    ]
+def test_piece(made: Plan) -> Plan:
+    """Return one pad, cast in the same process, for the bench."""
+    foot, radius = made.foot, made.foot.pad.radius
+    sole = max(radius + edge_of(radius) + 2e-3, 6e-3)
+    single = replace(foot, pads=1, sole_radius=sole, source=f'{foot.source}, one pad')
+    return plan(single, made.process, made.given)
 
 
-def _mix(each: Batch) -> str:
-    half, casting = 500.0 * each.mixed, each.material.casting
-    assert casting is not None
+def _meshes(made: Plan, parts: Mapping[str, Part], folder: str) -> dict[str, bytes]:
+    printed = [part for part in parts.values() if part.made in PRINTED]
+    found = {f'{part.name.replace(" ", "_")}.stl': stl(as_printed(part)) for part in printed}
+    holes = [(x, y, 1.5 + made.set['clearance']) for x, y in made.pegs(made.lid_angles)]
+    rings = [(0.0, 0.0, made.r['sole']), (0.0, 0.0, made.r['outer'])]
+    found |= {'printed.3mf': three_mf(printed), 'spacer.dxf': dxf([*rings, *holes]).encode()}
+    return {folder + name: data for name, data in found.items()}
+
+
+def rows(parts: Mapping[str, Part]) -> list[list[str]]:
+    """Return the printed parts and the spacer as texts, under :data:`HEADS`."""
+    found = []
+    for part in parts.values():
+        if part.made in DENSITY:
+            box, volume = part.solid.bounding_box(), 1e-3 * part.solid.volume()
+            size = ' × '.join(f'{box[k + 3] - box[k]:.1f}' for k in range(3))
+            values = f'{volume:.2f}', f'{1e-3 * volume * DENSITY[part.made]:.1f}'
+            faces = str(part.solid.num_tri())
+            found.append([part.name, part.made, size, *values, faces, _ON_BED[part.name]])
+    return found
+
+
+def measurements(made: Plan) -> str:
+    """Return the table to fill at the bench, which ``pad calibrate`` reads."""
+    shares = (0.4, 0.55, 0.7, 0.85, 0.95, 0.7, 0.85, 0.95)  # five heights, three limits
     return (
-        f'Weigh {half:.2f} g of each part of {each.material.name} (scale of 0.01 g), mix for three'
-        f' minutes and degas. It must be poured within {casting.pot_life / 60.0:.0f} minutes.'
-    )
+        f'# One pad of {made.foot.source}. Fill in heights (dial gauge) and force limits (scale),\n'
+        '# delete rows without a value, then:\n'
+        '# pad calibrate measurements.csv --foot as_made.yaml --out my_foot.yaml\n'
+        'pressure [kPa], height [mm], force_limit [N]\n'
+    ) + ''.join(f'{1e-3 * share * ceiling_of(made):.3g}, ,\n' for share in shares)
 
 
-def _cure(each: Batch) -> str:
-    casting = each.material.casting
-    assert casting is not None
-    return f'leave it for {casting.cure_time / 3600.0:.0f} hours at 23 °C.'
+# --- the page ------------------------------------------------------------------------------------
 
 
-_LAST = (
-    'Tap the hole of the cap to M5, screw in the fitting of the hose with sealant.',
-    'Under water at 10 kPa or a tenth of the ceiling: no bubbles, and every pad rises. Then the'
-    ' test piece: fill measurements.csv at the bench, and run pad calibrate.',
-)
-
-
-def _large(made: Plan, weigh: Sequence[Batch]) -> list[str]:
-    mix, holes = weigh[0], made.foot.pads * (made.r['hole'] ** 2 - made.r['pad'] ** 2)
-    first = math.pi * (holes * made.set['bone'] + made.r['gasket'] ** 2)  # mm³
-    casting = mix.material.casting
-    assert casting is not None
-    return [
-        *_first(made),
-        _mix(mix),
-        f'Fill the recess of the plate and heap up {1e-6 * first * casting.density:.1f} g between the'
-        ' pins. Push the bone over the pins until it lies on the plate: silicone must come up around'
-        ' every pin. (From above it would not run down there in time.)',
-        'Set the ring, pour from one side until the pins are covered, and degas again.',
-        f'Lay the spacer on the ring, lower the lid from one side, weigh it down with 1 kg, and'
-        f' {_cure(mix)}',
-        'Take off lid and spacer, draw the ring off towards the sole, then the inner mould straight'
-        ' along its pins, slowly: air must get in, or suction tears the sheet. Trim the vents.',
-        f'Screw the cap on the bone with {made.screws} screws M{made.set["screw"]:g} until it touches'
-        ' the bone: this squeezes the seal by 0.2 mm.',
-        *_LAST,
+def _page(made: Plan, parts: Mapping[str, Part], views: str) -> str:
+    escaped = [[html.escape(cell) for cell in row] for row in rows(parts)]
+    title = f'Making {made.foot.source}'
+    sections = [
+        heading(title, (f'{made.process} process', f'{made.foot.pads} pads')),
+        warning(_UNTRIED),
+        views,
+        '<h2>Parts to print and to cut</h2>' + table(HEADS, escaped, range(3, 6)),
+        '<h2>Silicone</h2>' + _weighed(made, parts),
+        '<h2>Work</h2><ol>' + ''.join(f'<li>{step}</li>' for step in _work(made, parts)) + '</ol>',
+        '<h2>What goes wrong</h2>' + plain_table(_FAULTS),
+        '<h2>What to expect</h2>' + _expectations(made),
     ]
+    return page(title, sections)
 
 
-def _small(made: Plan, weigh: Sequence[Batch]) -> list[str]:
-    sheet, body = weigh[0], weigh[-1]
-    return [
-        *_first(made),
-        _mix(body),
-        'Set the ring, pour around the pins until they are covered, degas, lower the lid without the'
-        f' spacer from one side, weigh it down with 1 kg, and {_cure(body)}',
-        'Take off the lid, and leave the body on its pins. Wipe the ends of the pins clean, and put'
-        ' release agent on them alone; clean the body with alcohol.',
-        _mix(sheet),
-        'Lay the spacer on the ring, pour over the body, degas, lower the lid from one side, weigh it'
-        f' down with 1 kg, and {_cure(sheet)}',
-        'Take off lid and spacer, draw the ring off towards the sole, then the inner mould straight'
-        ' along its pins, slowly: air must get in, or suction tears the sheet. Trim the vents.',
-        'Put the retainer over the sole up to the flange, and screw the cap on it with'
-        f' {made.screws} screws M{made.set["screw"]:g} until they touch: this squeezes the flange by'
-        ' 0.4 mm.',
-        *_LAST,
-    ]
+def _weighed(made: Plan, parts: Mapping[str, Part]) -> str:
+    body = []
+    for material, casting, mass, mixed in batches(made, parts):
+        times = f'{casting.pot_life / 60.0:.0f}', f'{casting.cure_time / 3600.0:.0f}'
+        words = html.escape(f'{casting.mix}, at 23 °C; read the label. {casting.source}')
+        half = f'{500.0 * mixed:.2f}'
+        body.append([html.escape(material.name), f'{1e3 * mass:.2f}', half, half, *times, words])
+    return table(_SILICONE, body, range(1, 6))
+
+
+def _work(made: Plan, parts: Mapping[str, Part]) -> list[str]:
+    """Return the steps of the work."""
+    weigh, r = batches(made, parts), made.r
+    lined = made.foot.pads * (r['hole'] ** 2 - r['pad'] ** 2) * made.set['bone']
+    values: dict[str, object] = {
+        'sheet': made.z['sheet'],
+        'off': made.set['tolerance'],
+        'sheet_of': made.sheet.name,
+        'body': made.body.name,
+        'heap': 1e-6 * math.pi * (lined + r['gasket'] ** 2) * weigh[-1].casting.density,
+        'close': _CLOSE[made.process],
+        'screws': made.screws,
+        'screw': made.set['screw'],
+    }
+    for name, batch in (('sheet', weigh[0]), ('body', weigh[-1])):
+        values[f'half_{name}'] = 500.0 * batch.mixed
+        values[f'pot_{name}'] = batch.casting.pot_life / 60.0
+        values[f'cure_{name}'] = batch.casting.cure_time / 3600.0
+    text = html.escape((_FIRST + _MIDDLE[made.process] + _LAST).format(**values), quote=False)
+    return text.removeprefix('- ').split('\n- ')
 
 
 def _expectations(made: Plan) -> str:
-    foot = made.foot
-    body = [
-        [
-            f'{1e3 * each.thickness:.3f}',
-            f'{each.stiffness:.3g}',
-            f'{each.pressure:.0f}',
-            _or_none(1e3 * each.height),
-            _or_none(each.force_limit),
-            f'{each.largest:.0f}',
-        ]
-        for each in expected(made)
-    ]
-    head = ('sheet, mm', 'stiffness, N/m', 'for the same dome, Pa')
-    head += (f'dome at {DOMED * foot.ceiling:.0f} Pa, mm', f'limit at {foot.ceiling:.0f} Pa, N')
-    words = [
+    foot, disc = made.foot, math.pi * made.r['sole'] ** 2 * made.z['sheet']
+    head, *body = expected(made)
+    mass = 1e-6 * batches(made, {})[0].casting.density * disc
+    words = (
         f'By the model of the foot, for a sheet that is {made.set["tolerance"]:g} mm off. All pads'
         ' share one plenum: the thinnest takes all the air once it balloons. The ceiling that'
         f' follows is {ceiling_of(made):.0f} Pa (that of {foot.source}: {foot.ceiling:.0f} Pa), and'
-        ' as_made.yaml has it.',
-        f'Weigh the sheet: on glass, one of ⌀ {2.0 * made.r["sole"]:.0f} mm has'
-        f' {_sheet_mass(made):.3f} g, and 0.01 g are {1.0 / _sheet_mass(made):.1f} % of it.',
-    ]
+        f' as_made.yaml has it. A disc of the sheet of ⌀ {2.0 * made.r["sole"]:.0f} mm weighs'
+        f' {mass:.3f} g; 0.01 g are {1.0 / mass:.1f} % of it. '
+    )
     if made.process == 'small':
-        words.append(
+        words += (
             f'The sole has no bone: as a plate it bulges by {made.bulge:.2g} mm at the ceiling.'
         )
     else:
-        words.append(
-            f'Only {made.z["bone"]:.1f} mm of silicone are under the bone, so that it holds the rims of'
-            f' the pads; the file of {foot.source} has {1e3 * foot.sole_thickness:g} mm, which land'
-            ' more softly.'
+        words += (
+            f'Only {made.z["bone"]:.1f} mm of silicone are under the bone, so that it holds the rims'
+            f' of the pads; {foot.source} has {1e3 * foot.sole_thickness:g} mm, which land softer.'
         )
-    return table((*head, 'balloons or model ends, Pa'), body, range(6)) + ''.join(
-        f'<p>{html.escape(each)}</p>' for each in words
-    )
-
-
-def _or_none(value: float) -> str:
-    return 'balloons' if math.isnan(value) else f'{value:.3g}'
-
-
-def _sheet_mass(made: Plan) -> float:
-    """Return the mass of a disc of the sheet, g."""
-    casting = made.sheet.casting
-    assert casting is not None
-    return 1e-6 * casting.density * math.pi * made.r['sole'] ** 2 * made.z['sheet']
-
-
-__all__ = ['files', 'process_of', 'test_piece']
+    return table(head, body, range(6)) + f'<p>{html.escape(words)}</p>'
