@@ -23,7 +23,8 @@ from ros_pad.commands.command import FILE, Commands, add_command, print_table
 from ros_pad.commands.folder import check_picture
 from ros_pad.configuration import number
 from ros_pad.contact import Design, Foot, Material, Pad, design
-from ros_pad.contact.design import CELL, Candidate, candidates
+from ros_pad.contact.design import Candidate, candidates
+from ros_pad.contact.layout import edge_of
 from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, criteria, resized
 from ros_pad.errors import InvalidInput
 from ros_pad.making.plan import verdict
@@ -106,7 +107,7 @@ def _of_stiffness(options: argparse.Namespace, foot: Foot, area: float) -> dict[
     radii = [
         design(options.load, area, resized(pad, radius), **rules)
         for radius in RADII
-        if area >= CELL * radius**2 and radius >= (pad.thickness or 0.0)
+        if area >= math.pi * (radius + edge_of(radius)) ** 2 and radius >= (pad.thickness or 0.0)
     ]
     if options.figure is not None:
         from ros_pad.reports.design import draw
@@ -193,17 +194,9 @@ def _cast(foot: Foot, pad: Pad, pads: int, area: float, ceiling: float) -> str:
     silicones = (
         foot.silicones if pad.material is None else (pad.material.name, *foot.silicones[1:])
     )
-    made = replace(
-        foot,
-        source='this design',
-        pad=pad,
-        pads=pads,
-        sole_radius=math.sqrt(area / math.pi),
-        ceiling=min(foot.ceiling, 0.999 * ceiling),
-        limit='flattening',
-        silicones=silicones,
-    )
-    return verdict(made)
+    new: dict[str, Any] = {'pad': pad, 'pads': pads, 'sole_radius': math.sqrt(area / math.pi)}
+    new |= {'silicones': silicones, 'ceiling': min(foot.ceiling, 0.999 * ceiling)}
+    return verdict(replace(foot, source='this design', limit='flattening', **new))
 
 
 def candidate_values(each: Candidate) -> dict[str, Any]:

@@ -14,7 +14,7 @@ SETTINGS
 
 For example:
   pad mould large37
-  pad mould my_foot.yaml --out my_moulds --set tolerance=3e-5 mount_circle=0.024
+  pad mould my_foot.yaml --out my_moulds --set tolerance=3e-5 --set mount_circle=0.024
 """
 
 from __future__ import annotations
@@ -22,13 +22,12 @@ from __future__ import annotations
 import argparse
 import pathlib
 import textwrap
-from typing import Any
 
 from ros_pad.commands.command import FOLDER, Commands, add_command, print_table
 from ros_pad.commands.progress import bar
+from ros_pad.commands.sweep import pairs, typed
 from ros_pad.configuration import refuse
 from ros_pad.contact import Foot
-from ros_pad.errors import InvalidInput
 from ros_pad.making.plan import PROCESSES, SETTINGS, plan
 
 
@@ -45,7 +44,8 @@ def add(commands: Commands) -> None:
     add = part.add_argument
     add('foot', metavar='FOOT', help='a name in config/feet or a YAML file')
     add('--process', choices=PROCESSES, help='see above (by the size of the pads)')
-    add('--set', nargs='+', default=[], metavar='NAME=VALUE', help='settings, see above')
+    text = 'a setting, see above; may be repeated'
+    add('--set', action='append', default=[], metavar='NAME=VALUE', help=text)
     add('--out', help='folder to write (default: FOOT_moulds here)', **FOLDER)
     add('--force', action='store_true', help='replace existing files')
 
@@ -53,7 +53,8 @@ def add(commands: Commands) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the files; return the exit status."""
     foot = Foot.load(options.foot)
-    made = plan(foot, options.process, _given(options.set))
+    given = {name: typed(text) for name, text in pairs('--set', options.set, '=').items()}
+    made = plan(foot, options.process, given)
     folder = options.out or pathlib.Path(f'{pathlib.Path(options.foot).stem}_moulds')
     from ros_pad.making import build
     from ros_pad.making.expect import ceiling_of
@@ -70,16 +71,3 @@ def run(options: argparse.Namespace) -> int:
     print(f'\nceiling to set: {ceiling_of(made):.0f} Pa gauge')
     print(f'page to work by: {folder / "making.html"}')
     return 0
-
-
-def _given(pairs: list[str]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for pair in pairs:
-        name, _, value = pair.partition('=')
-        try:
-            found[name] = int(value) if name == 'mount_holes' else float(value)
-        except ValueError:
-            raise InvalidInput(
-                f'--set {pair} is not allowed: NAME=VALUE, in SI units, is needed'
-            ) from None
-    return found

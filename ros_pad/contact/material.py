@@ -47,10 +47,8 @@ _Array = npt.NDArray[np.float64]
 
 _CASTING = (
     Setting('density', float, 'Density.', 'kg/m³', 500.0, 3000.0),
-    Setting('viscosity', float, 'Viscosity when mixed.', 'Pa s', 1e-3, 1e4),
     Setting('pot_life', float, 'Time from mixing until it must be poured.', 's', 10.0, 1e5),
     Setting('cure_time', float, 'Time until it may be taken from a mould.', 's', 60.0, 1e6),
-    Setting('shrinkage', float, 'Largest linear shrinkage.', '', 0.0, 0.1),
     Setting('mix', str, 'Ratio of its parts.'),
     Setting('source', str, 'Where these are from.'),
 )
@@ -60,10 +58,8 @@ class Casting(NamedTuple):
     """How a silicone is cast, by its maker; the keys of ``casting`` in a material file, SI."""
 
     density: float
-    viscosity: float
     pot_life: float
     cure_time: float
-    shrinkage: float
     mix: str
     source: str
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from ros_pad.contact import Foot, Material, Pad, force_limit, inflate
+from ros_pad.contact import Material, Pad, force_limit, inflate
 from ros_pad.contact.foot_file import foot_text
 from ros_pad.contact.limits import DEFAULT_CRITERION, largest_pressure
 from ros_pad.contact.material import Casting
@@ -39,10 +39,12 @@ def expected(made: Plan) -> list[tuple[str, ...]]:
     # A limit that was measured holds for its own pad alone.
     criterion = DEFAULT_CRITERION if foot.limit == 'measured' else foot.limit
     head = 'sheet, mm', 'stiffness, N/m', 'for the same dome, Pa', f'dome at {pressure:.0f} Pa, mm'
-    rows = [(*head, f'limit at {foot.ceiling:.0f} Pa, N', 'balloons or model ends, Pa')]
+    rows: list[tuple[str, ...]] = [
+        (*head, f'limit at {foot.ceiling:.0f} Pa, N', 'balloons or model ends, Pa')
+    ]
     for off in (-1e-3, 0.0, 1e-3):
-        thickness = _sheet(foot) + off * made.set['tolerance']
-        pad, share = _with_sheet(foot.pad, thickness), thickness / _sheet(foot)
+        thickness = 1e-3 * made.z['sheet'] + off * made.set['tolerance']
+        pad, share = _with_sheet(foot.pad, thickness), 1e3 * thickness / made.z['sheet']
         # Arrays have NaN above the end of a model.
         height = 1e3 * float(inflate(pad, [pressure]).height[0])
         limit = foot.pads * float(force_limit(pad, [foot.ceiling], criterion)[0])
@@ -51,11 +53,6 @@ def expected(made: Plan) -> list[tuple[str, ...]]:
         first = f'{1e3 * thickness:.3f}', f'{pad.stiffness:.3g}', f'{share * pressure:.0f}'
         rows.append((*first, *values, f'{largest_pressure(pad):.0f}'))
     return rows
-
-
-def _sheet(foot: Foot) -> float:
-    assert foot.pad.thickness is not None
-    return foot.pad.thickness
 
 
 def _with_sheet(pad: Pad, thickness: float) -> Pad:
@@ -72,7 +69,7 @@ def ceiling_of(made: Plan) -> float:
 
     All pads share one plenum: the thinnest takes all the air once it balloons.
     """
-    pad = _with_sheet(made.foot.pad, _sheet(made.foot) - 1e-3 * made.set['tolerance'])
+    pad = _with_sheet(made.foot.pad, 1e-3 * (made.z['sheet'] - made.set['tolerance']))
     if pad.material is not None and pad.material.factor_range is not None:
         pad = with_constant(pad, 'factor', pad.material.factor_range[0])
     return min(made.foot.ceiling, 100.0 * math.floor(0.0099 * largest_pressure(pad)))

@@ -12,19 +12,15 @@ import numpy as np
 
 from ros_pad.making.solids import Part, Solid, as_printed
 
-_TYPES = (
-    '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
-    '<Default Extension="rels"'
-    ' ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-    '<Default Extension="model"'
-    ' ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>'
-)
-_RELATIONS = (
-    '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
-    '<Relationship Id="r0" Target="/3D/3dmodel.model"'
-    ' Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'
-)
-_MODEL = 'http://schemas.microsoft.com/3dmanufacturing/core/2015/02'
+_OPC, _OOXML = 'http://schemas.openxmlformats.org/package/2006/', 'application/vnd.'
+_3MF = 'http://schemas.microsoft.com/3dmanufacturing/'
+_PACKAGE = {
+    '[Content_Types].xml': f'<Types xmlns="{_OPC}content-types"><Default Extension="rels"'
+    f' ContentType="{_OOXML}openxmlformats-package.relationships+xml"/><Default Extension="model"'
+    f' ContentType="{_OOXML}ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
+    '_rels/.rels': f'<Relationships xmlns="{_OPC}relationships"><Relationship Id="r0"'
+    f' Target="/3D/3dmodel.model" Type="{_3MF}2013/01/3dmodel"/></Relationships>',
+}
 
 
 def stl(solid: Solid) -> bytes:
@@ -46,26 +42,25 @@ def three_mf(parts: Iterable[Part]) -> bytes:
         x, y, _, far, _, _ = solid.bounding_box()
         mesh = solid.translate((left - x, -y, 0.0)).to_mesh()
         left += far - x + 5.0
-        points = ''.join(
-            '<vertex x="{:.6f}" y="{:.6f}" z="{:.6f}"/>'.format(*each)
-            for each in np.asarray(mesh.vert_properties)[:, :3].tolist()
-        )
-        faces = ''.join(
-            '<triangle v1="{}" v2="{}" v3="{}"/>'.format(*each)
-            for each in np.asarray(mesh.tri_verts).tolist()
+        points, faces = mesh.vert_properties[:, :3].tolist(), mesh.tri_verts.tolist()
+        corner, face = (
+            '<vertex x="{:.6f}" y="{:.6f}" z="{:.6f}"/>',
+            '<triangle v1="{}" v2="{}" v3="{}"/>',
         )
         objects.append(
-            f'<object id="{number}" type="model" name={quoteattr(part.name)}><mesh>'
-            f'<vertices>{points}</vertices><triangles>{faces}</triangles></mesh></object>'
+            f'<object id="{number}" type="model" name={quoteattr(part.name)}><mesh><vertices>'
+            + ''.join(corner.format(*each) for each in points)
+            + '</vertices><triangles>'
+            + ''.join(face.format(*each) for each in faces)
+            + '</triangles></mesh></object>'
         )
         items.append(f'<item objectid="{number}"/>')
     model = (
-        f'<?xml version="1.0" encoding="UTF-8"?><model unit="millimeter" xml:lang="en"'
-        f' xmlns="{_MODEL}"><resources>{"".join(objects)}</resources>'
+        '<?xml version="1.0" encoding="UTF-8"?><model unit="millimeter" xml:lang="en"'
+        f' xmlns="{_3MF}core/2015/02"><resources>{"".join(objects)}</resources>'
         f'<build>{"".join(items)}</build></model>'
     )
-    names = '[Content_Types].xml', '_rels/.rels', '3D/3dmodel.model'
-    return zipped(dict(zip(names, (_TYPES, _RELATIONS, model), strict=True)))
+    return zipped(_PACKAGE | {'3D/3dmodel.model': model})
 
 
 def zipped(files: Mapping[str, str | bytes]) -> bytes:

@@ -7,11 +7,11 @@ Lengths of a :class:`Plan` are millimetres; z is 0 on the floor and grows toward
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ros_pad.configuration import Setting, choice, nearest
+from ros_pad.configuration import Setting, Table, choice
 from ros_pad.contact import Foot, Material
 from ros_pad.contact.layout import LARGE, LINING, RIM, SKIN, WALL, Layout, hexagonal, reach_of
 from ros_pad.contact.pad import Array
@@ -105,11 +105,6 @@ class Plan:
         return [(radius * math.cos(a), radius * math.sin(a)) for a in turns]
 
     @property
-    def load(self) -> float:
-        """Peak load, N."""
-        return self.set['load'] or 3.0 * self.foot.limits[-1]
-
-    @property
     def bulge(self) -> float:
         """How far the sole without a bone bulges at the ceiling, mm: a clamped plate.
 
@@ -120,25 +115,6 @@ class Plan:
         return 9e-6 * self.foot.ceiling * self.r['plenum'] ** 4 / (64.0 * modulus * thick**3)
 
 
-def process_of(foot: Foot) -> str:
-    """Return the process by which a foot is made: large from pads of 1 mm radius on."""
-    return 'large' if foot.pad.radius >= LARGE else 'small'
-
-
-def settings_of(given: Mapping[str, Any]) -> dict[str, float]:
-    """Return :data:`SETTINGS` with the given values, lengths in mm."""
-    known = {each.name: each for each in SETTINGS}
-    for name in given:
-        if name not in known:
-            hint = nearest(name, list(known)) or '.'
-            raise InvalidInput(f'{name} is no setting of moulds{hint}')
-    return {
-        name: setting.accept(given.get(name, setting.default))
-        * (1e3 if setting.unit == 'm' else 1.0)
-        for name, setting in known.items()
-    }
-
-
 def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None = None) -> Plan:
     """Return the dimensions of a foot and of its moulds.
 
@@ -147,34 +123,51 @@ def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None
     foot : Foot
         Its ``silicones`` say what it is cast of.
     process : {'large', 'small'}, optional
-        By default :func:`process_of`.
+        By default large from pads of 1 mm radius on.
     given : dict of str to float, optional
         Values of :data:`SETTINGS`, SI.
 
     Raises
     ------
     InvalidInput
-        When a setting is not allowed or the foot cannot be made; the message has every reason,
-        each with the number that would do.
+        When the foot cannot be made; the message has every reason, each with the number that would
+        do.
+    ConfigError
+        When a setting is unknown or not allowed.
     """
-    process = choice('process', process or process_of(foot), PROCESSES)
-    use = settings_of(given or {})
+    usual = 'large' if foot.pad.radius >= LARGE else 'small'
+    process = choice('process', process or usual, PROCESSES)
+    table = Table(dict(given or {}), 'settings of moulds')
+    values = table.values(SETTINGS)
+    table.finish()
+    use = {each.name: values[each.name] * (1e3 if each.unit == 'm' else 1.0) for each in SETTINGS}
     sheet, body = _silicones(foot, process)
     large = process == 'large'
     edge = use['lining'] + use['wall'] + use['skin'] if large else use['rim']
     layout = Layout.of(foot.pads, foot.pad.radius, foot.sole_radius, 1e-3 * edge)
     places, pitch = 1e3 * layout.places, 1e3 * layout.pitch
     made = Plan(foot, process, dict(given or {}), use, places, pitch, {}, {}, sheet, body)
-    if pitch <= 0.0 or foot.pad.thickness is None or 1e3 * foot.sole_radius < _least(made, edge):
-        raise InvalidInput('; '.join(_no_room(made, edge)))
+    title = f'{foot.source} cannot be made ({process} process)'
+    least = _least(made, edge)
+    if 1e3 * foot.sole_radius < least:
+        raise InvalidInput(
+            f'{title}: {foot.pads} pads of radius {1e3 * foot.pad.radius:g} mm on a sole of radius'
+            f' {1e3 * foot.sole_radius:g} mm leave no room for walls between them and at the edge:'
+            f' sole_radius of at least {0.1 * math.ceil(10.0 * least - 1e-9):.1f} mm is needed, or'
+            ' fewer pads'
+        )
     if large:
         use['bone'] = use['bone'] or max(8.0, 0.5 * math.ceil(2.0 * bone_needed(made)))
     made.z.update(_heights(made))
     made.r.update(_radii(made, reach_of(places)))
-    if reasons := _reasons(made):
-        raise InvalidInput(
-            f'{foot.source} cannot be made ({process} process): {"; ".join(reasons)}'
-        )
+    wrong = [
+        f'{name} is {value:.3g} mm, {"at least" if value < low else "at most"}'
+        f' {low if value < low else high:.3g} mm is needed'
+        for name, value, low, high in _limits(made)
+        if not low - 1e-9 <= value <= high + 1e-9
+    ]
+    if wrong:
+        raise InvalidInput(f'{title}: {"; ".join(wrong)}')
     return made
 
 
@@ -190,21 +183,18 @@ def verdict(foot: Foot) -> str:
 
 
 def _silicones(foot: Foot, process: str) -> tuple[Material, Material]:
-    names = foot.silicones
-    own = foot.pad.material.name if foot.pad.material is not None else ''
-    if own and (not names or own != names[0]):
-        names = (own, *names[1:])
-    if not names or (process == 'small' and len(names) < 2):
-        need = 'sheet and body' if process == 'small' else 'sheet'
+    own, need = foot.pad.material, 1 + (process == 'small')
+    names = foot.silicones if own is None else (own.name, *foot.silicones[1:])
+    if len(names) < need or foot.pad.thickness is None:
         raise InvalidInput(
-            f'{foot.source}: silicones = {list(names)} is not allowed: the names of materials of'
-            f' {need} are needed, as [ecoflex_00_20, dragon_skin_30]'
+            f'{foot.source}: thickness and silicones of {"sheet and body" if need > 1 else "sheet"}'
+            f' are needed, as silicones: [ecoflex_00_20, dragon_skin_30]; not {list(names)}'
         )
-    found = Material.load(names[0]), Material.load(names[-1] if process == 'small' else names[0])
-    for name, each in zip(names, found, strict=False):
+    found = [Material.load(name) for name in names[:need]]
+    for each in found:
         if each.casting is None:
-            raise InvalidInput(f'{name}: how it is cast is not known: the key casting is missing')
-    return found
+            raise InvalidInput(f'{each.name}: how it is cast is missing: the key casting')
+    return found[0], found[-1]
 
 
 def _heights(made: Plan) -> dict[str, float]:
@@ -233,12 +223,9 @@ def _radii(made: Plan, reach: float) -> dict[str, float]:
     hole = 0.5 * use['screw'] + 0.2
     screws = gasket + 1.0 + use['wall'] + hole
     flange = screws + hole + 2.0
-    return {
-        **{'pad': pad, 'root': root, 'sole': sole, 'bore': bore, 'plenum': plenum},
-        **{'gasket': gasket, 'screw': hole, 'screws': screws, 'flange': flange},
-        **{'outer': flange + use['clearance'] + 6.0, 'hole': pad + use['lining']},
-        'bone': sole - use['skin'],
-    }
+    r = {'pad': pad, 'root': root, 'sole': sole, 'bore': bore, 'plenum': plenum, 'gasket': gasket}
+    r |= {'hole': pad + use['lining'], 'bone': sole - use['skin'], 'screw': hole, 'screws': screws}
+    return r | {'flange': flange, 'outer': flange + use['clearance'] + 6.0}
 
 
 def _least(made: Plan, edge: float) -> float:
@@ -254,58 +241,33 @@ def _least(made: Plan, edge: float) -> float:
     return cell * reach_of(shape - shape.mean(axis=0)) + radius + edge
 
 
-def _no_room(made: Plan, edge: float) -> list[str]:
-    foot = made.foot
-    if foot.pad.thickness is None:
-        return [f'{foot.source}: the thickness of the sheet is missing']
-    wall = 'walls of the bone' if made.process == 'large' else 'walls of silicone'
-    least = 0.1 * math.ceil(10.0 * _least(made, edge) - 1e-9)
-    return [
-        f'{foot.source} cannot be made ({made.process} process): {foot.pads} pads of radius'
-        f' {1e3 * foot.pad.radius:g} mm on a sole of radius {1e3 * foot.sole_radius:g} mm leave no'
-        f' room for {wall} between them and for the edge: sole_radius of at least {least:.1f} mm'
-        ' is needed, or fewer pads'
-    ]
-
-
-def _reasons(made: Plan) -> list[str]:
-    """Return why a foot cannot be made, each with the number that would do."""
+def _limits(made: Plan) -> Iterator[tuple[str, float, float, float]]:
+    """Yield lengths, mm, with their least and largest allowed value."""
     use, z, r = made.set, made.z, made.r
-    found = []
-
-    def need(name: str, value: float, least: float, unit: str = 'mm') -> None:
-        if value < least - 1e-9:
-            found.append(f'{name} is {value:.3g} {unit}, at least {least:.3g} {unit} is needed')
-
-    def most(name: str, value: float, limit: float, unit: str = 'mm') -> None:
-        if value > limit + 1e-9:
-            found.append(f'{name} is {value:.3g} {unit}, at most {limit:.3g} {unit} is allowed')
-
-    long = z['face'] - z['sheet']
-    need('the sheet, for this tolerance,', z['sheet'], 2.0 * use['tolerance'])
-    most('the sheet', z['sheet'], 0.9 * r['pad'])
-    need('a pad, as a pin of resin, in diameter', 2.0 * r['pad'], use['pin'])
-    need('a pad, as a pin of this length, in diameter', 2.0 * r['pad'], long / use['slenderness'])
-    need('wall', use['wall'], 2.0 * use['nozzle'])
-    most('the largest part', 2.0 * r['outer'], use['bed'])
+    least_pin = max(use['pin'], (z['face'] - z['sheet']) / use['slenderness'])
+    roof = _plate(made.foot.ceiling, r['plenum'], 1.0)
+    yield 'the sheet, for its tolerance,', z['sheet'], 2.0 * use['tolerance'], 0.9 * r['pad']
+    yield 'a pad, as a pin of resin, in diameter,', 2.0 * r['pad'], least_pin, math.inf
+    yield 'wall', use['wall'], 2.0 * use['nozzle'], math.inf
+    yield 'the largest part', 2.0 * r['outer'], 0.0, use['bed']
+    yield 'the roof of the cap', z['cap'] - z['roof'], roof, math.inf
     if made.process == 'large':
-        slope = r['root'] - r['pad']
-        need('the lining of silicone beside the root of a pin', use['lining'] - slope, use['web'])
-        need('skin', use['skin'], use['web'])
-        need('under', use['under'], use['web'])
-        need('a hole of the bone, in diameter,', 2.0 * r['hole'], use['hole'])
-        need('bone', use['bone'], max(bone_needed(made), use['flange'] + 2.0))
-        need('flange', use['flange'], flange_needed(made))
+        lining, bone = use['lining'] - r['root'] + r['pad'], use['flange'] + 2.0
+        yield 'lining, at the root of a pin,', lining, use['web'], math.inf
+        yield 'skin', use['skin'], use['web'], math.inf
+        yield 'under', use['under'], use['web'], math.inf
+        yield 'a hole of the bone, in diameter,', 2.0 * r['hole'], use['hole'], math.inf
+        yield 'bone', use['bone'], max(bone_needed(made), bone), math.inf
+        yield 'flange', use['flange'], flange_needed(made), math.inf
     else:
-        need('sole_thickness', z['top'], z['sheet'] + 3.0)
-    need('the roof of the cap', z['cap'] - z['roof'], _plate(made.foot.ceiling, r['plenum'], 1.0))
+        # As a plate its bulge falls with the cube of its thickness: at most a pad's radius.
+        body = (z['top'] - z['sheet']) * (made.bulge / r['pad']) ** (1.0 / 3.0)
+        yield 'sole_thickness', z['top'], z['sheet'] + max(3.0, body), math.inf
+        yield 'rim', use['rim'], 0.8, math.inf
     if use['mount_holes'] and made.foot.pads > 1:
-        middle, half = 0.5 * use['mount_circle'], 0.5 * use['mount_hole']
-        least = 0.5 * use['fitting'] + use['wall'] + half
-        need('mount_circle, beside the fitting,', 2.0 * middle, 2.0 * least)
-        outside = r['screws'] - r['screw'] - use['wall'] - half
-        most('mount_circle, beside the screws,', 2.0 * middle, 2.0 * outside)
-    return found
+        half = 0.5 * use['mount_hole'] + use['wall']
+        least, most = 0.5 * use['fitting'] + half, r['screws'] - r['screw'] - half
+        yield 'mount_circle', use['mount_circle'], 2.0 * least, 2.0 * most
 
 
 def _plate(pressure: float, radius: float, solid: float) -> float:
@@ -320,7 +282,8 @@ def _plate(pressure: float, radius: float, solid: float) -> float:
 
 def _worst(made: Plan) -> float:
     """Return the larger of the ceiling and the peak load over the sole, Pa."""
-    return max(made.foot.ceiling, made.load / made.foot.sole_area)
+    load = made.set['load'] or 3.0 * made.foot.limits[-1]
+    return max(made.foot.ceiling, load / made.foot.sole_area)
 
 
 def bone_needed(made: Plan) -> float:

@@ -6,7 +6,6 @@ Cuts overlap: two that end in one plane would leave a film between them.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple, TypeAlias
@@ -35,6 +34,8 @@ class Part(NamedTuple):
         Direction along z in which it leaves the cast or the foot: 1, -1, or 0 for none.
     flip : bool
         Whether it is printed upside down.
+    bed : str
+        How it lies on the bed, in words.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Part(NamedTuple):
     made: str
     leaves: int = 0
     flip: bool = False
+    bed: str = ''
 
 
 def build(made: Plan) -> dict[str, Part]:
@@ -64,8 +66,9 @@ class _Builder:
 
     def __init__(self, made: Plan, kind: Any) -> None:
         self.made, self.kind = made, kind
-        self.z, self.r = made.z, made.r
+        self.z, self.r, self.gap = made.z, made.r, made.set['clearance']
         self.slope = math.tan(math.radians(made.set['draft']))
+        self.large = made.process == 'large'
 
     def disc(self, radius: float, low: float, high: float, top: float | None = None) -> Solid:
         """Return a disc or cone about the z axis."""
@@ -73,178 +76,140 @@ class _Builder:
         end = radius if top is None else top
         return self.kind.cylinder(high - low, radius, end, sides).translate((0.0, 0.0, low))
 
-    def at(self, solid: Solid, places: Iterable[tuple[float, float]]) -> Solid:
-        """Return copies of a solid at places that do not overlap."""
-        return self.kind.compose([solid.translate((x, y, 0.0)) for x, y in places])
+    def cut(self, radius: float, low: float, high: float) -> Solid:
+        """Return a disc that goes beyond both ends, to be cut out."""
+        return self.disc(radius, low - _OVER, high + _OVER)
 
-    def around(self, solid: Solid, radius: float, angles: Iterable[float]) -> Solid:
-        """Return copies of a solid on a circle, at angles in degrees."""
-        turns = [math.radians(angle) for angle in angles]
+    def at(self, solid: Solid, places: Iterable[Iterable[float]]) -> Solid:
+        """Return copies of a solid at places that do not overlap."""
+        return self.kind.compose([solid.translate((*place, 0.0)) for place in places])
+
+    def around(self, solid: Solid, radius: float, count: int, step: int = 1) -> Solid:
+        """Return copies of a solid in equal steps on a circle."""
+        turns = [2.0 * math.pi * k / count for k in range(0, count, step)]
         return self.at(solid, [(radius * math.cos(a), radius * math.sin(a)) for a in turns])
 
-    @functools.cached_property
-    def screw_angles(self) -> list[float]:
-        return [360.0 * k / self.made.screws for k in range(self.made.screws)]
+    def screws(self, low: float, high: float) -> Solid:
+        """Return the holes of the screws."""
+        return self.around(
+            self.cut(self.r['screw'], low, high), self.r['screws'], self.made.screws
+        )
 
-    @functools.cached_property
-    def pins(self) -> Solid:
-        """The pins, which are the chambers and channels of the cast."""
-        low, high, pad = self.z['sheet'], self.z['face'], self.r['pad']
-        return self.at(self.disc(pad, low, high, self.r['root']), self.made.places.tolist())
+    def pins(self, over: float) -> Solid:
+        """Return the pins, which are chambers and channels of the cast, with longer roots."""
+        low, high = self.z['sheet'], self.z['face'] + over
+        pin = self.disc(self.r['pad'], low, high, self.r['root'] + self.slope * over)
+        return self.at(pin, self.made.places.tolist())
 
-    @functools.cached_property
+    def seal(self, over: float = 0.0) -> Solid:
+        """Return the silicone that seals, gasket on the bone or flange of the body, from lower."""
+        low, radius = self.z['top' if self.large else 'flange'], self.r['gasket']
+        return self.disc(
+            radius + self.slope * over, low - over, self.z['face'], radius - self.slope
+        )
+
     def bone(self) -> Solid:
         z, r = self.z, self.r
-        solid = self.disc(r['bone'], z['bone'], z['top']) + self.disc(
-            r['flange'], z['flange'], z['top']
-        )
-        hole = self.disc(r['hole'], z['bone'] - _OVER, z['top'] + _OVER)
-        solid -= self.at(hole, self.made.places.tolist())
-        screw = self.disc(r['screw'], z['flange'] - _OVER, z['top'] + _OVER)
-        return solid - self.around(screw, r['screws'], self.screw_angles)
-
-    @functools.cached_property
-    def outside(self) -> Solid:
-        """The outside of the cast, without what is in it: sheet, wall with draft, gasket."""
-        z, r = self.z, self.r
-        # Into the flange, of bone or silicone: they shall not end in one plane.
-        end = z['flange'] + _OVER
-        wall = self.disc(r['sole'], z['sheet'], end, r['bore'] + self.slope * _OVER)
-        if self.made.process == 'small':
-            return wall + self.flange
-        inside = self.disc(r['bone'], z['bone'], z['top'] + _OVER)
-        return wall + inside + self.flange
-
-    @functools.cached_property
-    def flange(self) -> Solid:
-        """The silicone that seals: a gasket on the bone, or the flange of the body."""
-        z, r = self.z, self.r
-        low = z['top'] if self.made.process == 'large' else z['flange']
-        return self.disc(r['gasket'], low, z['face'], r['gasket'] - self.slope)
-
-    @functools.cached_property
-    def sheet(self) -> Solid:
-        return self.disc(self.r['sole'], 0.0, self.z['sheet'])
+        solid = self.disc(r['bone'], z['bone'], z['top'])
+        solid += self.disc(r['flange'], z['flange'], z['top'])
+        solid -= self.at(self.cut(r['hole'], z['bone'], z['top']), self.made.places.tolist())
+        return solid - self.screws(z['flange'], z['top'])
 
     def parts(self) -> dict[str, Part]:
         """Return all parts."""
-        large, body = self.made.process == 'large', self.outside - self.pins
-        names = self.made.sheet.name, self.made.body.name
+        z, r, sheet, body = self.z, self.r, self.made.sheet.name, self.made.body.name
+        # Into the flange, of bone or silicone: they shall not end in one plane.
+        over, end = r['bore'] + self.slope * _OVER, z['flange'] + _OVER
+        cast = self.disc(r['sole'], z['sheet'], end, over) + self.seal()
         found = [
-            Part('lid', self.lid(), 'filament', -1, True),
-            Part('spacer', self.spacer(), 'film', -1),
-            Part('ring', self.ring(), 'filament', -1),
-            Part('inner mould', self.inner(), 'resin', 1, True),
-            Part('cap', self.cap(), 'filament', 1, True),
+            Part('lid', self.lid(), 'filament', -1, True, 'flat face down, pegs up'),
+            Part('spacer', self.spacer(), 'film', -1, bed='cut from film by spacer.dxf'),
+            Part('ring', self.ring(), 'filament', -1, bed='face with the groove down'),
+            Part(
+                'inner mould', self.inner(), 'resin', 1, True, 'plate down, pins without supports'
+            ),
+            Part('cap', self.cap(), 'filament', 1, True, 'flat top down, open side up'),
         ]
-        if large:
-            foot = (body - self.bone) + self.disc(self.r['sole'], 0.0, self.z['sheet'] + 1e-3)
-            found += [Part('bone', self.bone, 'filament', 0, True)]
-            found += [Part('silicone', foot - self.pins, names[0])]
+        if self.large:
+            bone = self.bone()
+            cast += self.disc(r['bone'], z['bone'], z['top'] + _OVER)
+            cast = cast - bone + self.disc(r['sole'], 0.0, z['sheet'] + 1e-3) - self.pins(_OVER)
+            found += [Part('bone', bone, 'filament', 0, True, 'flange down')]
+            found += [Part('silicone', cast, sheet)]
         else:
-            found += [Part('retainer', self.retainer(), 'filament', -1)]
-            found += [Part('body', body, names[1]), Part('sheet', self.sheet, names[0])]
-        found.append(Part('air', self.air(), 'air'))
-        return {each.name: each for each in found}
+            found += [
+                Part('retainer', self.retainer(), 'filament', -1, bed='flat face down'),
+                Part('body', cast - self.pins(_OVER), body),
+                Part('sheet', self.disc(r['sole'], 0.0, z['sheet']), sheet),
+            ]
+        air = self.pins(1e-3) + self.disc(r['plenum'], z['face'], z['roof'])
+        air += self.disc(0.5 * self.made.set['fitting'], z['roof'] - 1e-3, z['cap'])
+        return {each.name: each for each in [*found, Part('air', air, 'air')]}
 
     def inner(self) -> Solid:
-        """Plate with the pins; dowels hold the bone (in its screw holes) and the ring."""
-        z, r, gap = self.z, self.r, self.made.set['clearance']
+        """Return the plate with the pins; dowels hold bone (by its screw holes) and ring."""
+        z, r = self.z, self.r
         plate = self.disc(r['outer'], z['top'], z['face'] + _PLATE)
-        if self.made.process == 'large':
-            # By the flange's cone, so that it leaves the gasket.
-            plate -= self.disc(
-                r['gasket'] + self.slope * _OVER,
-                z['top'] - _OVER,
-                z['face'],
-                r['gasket'] - self.slope,
-            )
-            dowel = self.disc(r['screw'] - 0.5 * gap, z['flange'] + 0.5, z['face'] + 1.0)
-            plate += self.around(dowel, r['screws'], self.screw_angles[::2][:3])
-        root = self.disc(r['pad'], z['sheet'], z['face'] + _OVER, r['root'] + self.slope * _OVER)
-        plate += self.at(root, self.made.places.tolist())
-        return plate + self.at(self.peg(z['top'], -1.0), self.made.pegs(self.made.plate_angles))
-
-    def peg(self, level: float, up: float) -> Solid:
-        """Return a peg of 3 mm that stands 3 mm above or below a face, into which it reaches."""
-        ends = sorted((level + 3.0 * up, level - 1.0 * up))
-        return self.disc(1.5, *ends)
-
-    def socket(self, level: float, up: float) -> Solid:
-        """Return the hole for a peg, 3.5 mm into a face that looks against ``up``."""
-        ends = sorted((level + 3.5 * up, level - _OVER * up))
-        return self.disc(1.5 + self.made.set['clearance'], *ends)
+        if self.large:
+            dowel = self.disc(r['screw'] - 0.5 * self.gap, z['flange'] + 0.5, z['face'] + 1.0)
+            step = self.made.screws // 3
+            plate -= self.seal(_OVER)
+            plate += self.around(dowel, r['screws'], self.made.screws, step)
+        peg = self.disc(1.5, z['top'] - 3.0, z['top'] + 1.0)
+        return plate + self.pins(_OVER) + self.at(peg, self.made.pegs(self.made.plate_angles))
 
     def ring(self) -> Solid:
         """Return the wall of the mould: its face is flush with the pins' ends."""
-        z, r, gap = self.z, self.r, self.made.set['clearance']
-        low, up = z['sheet'], z['flange']
-        solid = self.disc(r['outer'], low, z['top'])
-        bore = self.disc(
-            r['sole'] - self.slope * _OVER, low - _OVER, up + _OVER, r['bore'] + self.slope * _OVER
-        )
-        wide = r['flange'] + gap if self.made.process == 'large' else r['gasket']
-        solid -= bore + self.disc(wide, up, z['top'] + _OVER)
+        z, r, low, up = self.z, self.r, self.z['sheet'], self.z['flange']
+        more = self.slope * _OVER
+        wide = r['flange'] + self.gap if self.large else r['gasket']
+        solid = self.disc(r['outer'], low, z['top']) - self.disc(wide, up, z['top'] + _OVER)
+        solid -= self.disc(r['sole'] - more, low - _OVER, up + _OVER, r['bore'] + more)
         groove = self.disc(r['sole'] + 4.0, low - _OVER, low + 1.0)
         solid -= groove - self.disc(r['sole'] + 2.5, low - 1.0, low + 2.0)
         vent = self.kind.cube((3.5 + _OVER, 1.0, _VENT + _OVER), False)
         vent = vent.translate((r['sole'] - _OVER, -0.5, low - _OVER))
         for turn in range(12):
             solid -= vent.rotate((0.0, 0.0, 30.0 * turn + 10.0))
-        solid -= self.at(self.socket(low, 1.0), self.made.pegs(self.made.lid_angles))
-        return solid - self.at(self.socket(z['top'], -1.0), self.made.pegs(self.made.plate_angles))
+        for start, end, angles in (
+            (low - _OVER, low + 3.5, self.made.lid_angles),
+            (z['top'] - 3.5, z['top'] + _OVER, self.made.plate_angles),
+        ):
+            solid -= self.at(self.disc(1.5 + self.gap, start, end), self.made.pegs(angles))
+        return solid
 
     def lid(self) -> Solid:
         """Return the flat plate that closes the mould on the floor's side."""
-        peg = self.disc(1.5, -1.0, self.z['sheet'] + 3.0)
-        return self.disc(self.r['outer'], -_LID, 0.0) + self.at(
-            peg, self.made.pegs(self.made.lid_angles)
+        pegs = self.at(
+            self.disc(1.5, -1.0, self.z['sheet'] + 3.0), self.made.pegs(self.made.lid_angles)
         )
+        return self.disc(self.r['outer'], -_LID, 0.0) + pegs
 
     def spacer(self) -> Solid:
         """Return the ring of film under the lid, as thick as the sheet: cut, not printed."""
-        low, high = -_OVER, self.z['sheet'] + _OVER
-        solid = self.disc(self.r['outer'], 0.0, self.z['sheet'])
-        holes = self.disc(1.5 + self.made.set['clearance'], low, high)
-        solid -= self.disc(self.r['sole'], low, high)
-        return solid - self.at(holes, self.made.pegs(self.made.lid_angles))
+        high, r = self.z['sheet'], self.r
+        holes = self.at(self.cut(1.5 + self.gap, 0.0, high), self.made.pegs(self.made.lid_angles))
+        return self.disc(r['outer'], 0.0, high) - self.cut(r['sole'], 0.0, high) - holes
 
     def cap(self) -> Solid:
-        """Plenum, sealing face, hole for the fitting, screws, and holes for the leg."""
+        """Return plenum, sealing face, hole for the fitting, screws, and holes for the leg."""
         z, r, use = self.z, self.r, self.made.set
-        solid = self.disc(r['flange'], z['stop'], z['cap'])
-        if self.made.process == 'large':
+        solid = self.disc(r['flange'], z['stop'], z['cap']) - self.screws(z['stop'], z['cap'])
+        if self.large:
             solid -= self.disc(r['gasket'] + 1.0, z['stop'] - _OVER, z['land'])
         solid -= self.disc(r['plenum'], z['stop'] - _OVER, z['roof'])
-        solid -= self.disc(0.5 * use['fitting'], z['roof'] - _OVER, z['cap'] + _OVER)
-        screw = self.disc(r['screw'], z['stop'] - _OVER, z['cap'] + _OVER)
-        solid -= self.around(screw, r['screws'], self.screw_angles)
-        count = int(use['mount_holes']) if self.made.foot.pads > 1 else 0
-        if not count:
+        solid -= self.cut(0.5 * use['fitting'], z['roof'], z['cap'])
+        if not use['mount_holes'] or self.made.foot.pads == 1:
             return solid
         hole = self.disc(0.5 * use['mount_hole'], z['cap'] - 4.5, z['cap'] + _OVER)
-        angles = [360.0 * k / count + 15.0 for k in range(count)]
-        return solid - self.around(hole, 0.5 * use['mount_circle'], angles)
+        return solid - self.around(hole, 0.5 * use['mount_circle'], int(use['mount_holes']))
 
     def retainer(self) -> Solid:
         """Return the ring under the body's flange, as high as the squeezed flange."""
-        z, r, gap = self.z, self.r, self.made.set['clearance']
-        low, up = z['flange'] - 3.0, z['stop']
-        solid = self.disc(r['flange'], low, up) - self.disc(
-            r['bore'] + gap, low - _OVER, up + _OVER
-        )
-        solid -= self.disc(r['gasket'] + 1.0, z['flange'], up + _OVER)
-        screw = self.disc(r['screw'], low - _OVER, up + _OVER)
-        return solid - self.around(screw, r['screws'], self.screw_angles)
-
-    def air(self) -> Solid:
-        """Chambers, channels, plenum and the hole for the fitting."""
-        z, r = self.z, self.r
-        pins = self.disc(r['pad'], z['sheet'], z['face'] + 1e-3, r['root'])
-        chambers = self.at(pins, self.made.places.tolist())
-        plenum = self.disc(r['plenum'], z['face'], z['roof'])
-        inlet = self.disc(0.5 * self.made.set['fitting'], z['roof'] - 1e-3, z['cap'])
-        return chambers + plenum + inlet
+        r, low, up = self.r, self.z['flange'] - 3.0, self.z['stop']
+        solid = self.disc(r['flange'], low, up) - self.screws(low, up)
+        solid -= self.cut(r['bore'] + self.gap, low, up)
+        return solid - self.disc(r['gasket'] + 1.0, self.z['flange'], up + _OVER)
 
 
 def as_printed(part: Part) -> Solid:

@@ -7,11 +7,12 @@ import csv
 import html
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import matplotlib
 
+from ros_pad.configuration import shared_folder
 from ros_pad.contact.layout import edge_of
 from ros_pad.making import Part, Plan, build, plan
 from ros_pad.making.expect import DENSITY, as_made, batches, ceiling_of, expected
@@ -19,23 +20,14 @@ from ros_pad.making.files import dxf, stl, three_mf
 from ros_pad.making.solids import as_printed
 from ros_pad.pace import Progress
 from ros_pad.reports.mould_drawings import drawing, exploded
-from ros_pad.reports.page import heading, page, plain_table, section, table, warning
+from ros_pad.reports.page import heading, page, section, table, warning
 from ros_pad.reports.style import STYLE, rendered
 
 PRINTED = ('filament', 'resin')
 HEADS = ('part', 'of', 'size, mm', 'volume, cm³', 'mass, g', 'triangles', 'on the bed')
-_ON_BED = {
-    'lid': 'flat face down, pegs up',
-    'ring': 'face with the groove down',
-    'inner mould': 'plate down, pins up; no supports on the pins',
-    'bone': 'flange down',
-    'cap': 'flat top down, open side up',
-    'retainer': 'flat face down',
-    'spacer': 'cut from film by spacer.dxf, not printed',
-}
 _UNTRIED = (
-    'No foot was made by these files yet: they were modelled, checked and sliced. Cast the test piece'
-    ' first.'
+    'No foot was made by these files yet: they were modelled, checked and sliced. Cast the test'
+    ' piece first.'
 )
 _SILICONE = (
     'silicone',
@@ -46,63 +38,6 @@ _SILICONE = (
     'cure, h',
     '',
 )
-_FAULTS = (
-    (
-        'A pad stays flat',
-        'Its channel is blocked by silicone: push a wire through from the plenum.',
-    ),
-    (
-        'One pad grows before all others',
-        'Its sheet is thin there, or holds a bubble. Vent at once.',
-    ),
-    ('Air leaves at the rim of a pad', 'The sheet did not bond, or release agent got between.'),
-    ('Air leaves at the cap', 'The seal is dirty or a screw loose: it is squeezed by a fifth.'),
-    (
-        'Silicone is sticky at the pins',
-        'The resin stopped its cure: wash, cure and lacquer again.',
-    ),
-    ('Sheet too thick all over', 'The lid was not pressed down, or flash lies under the spacer.'),
-)
-# Steps begin with a dash; names in braces are filled in by _work.
-_FIRST = """- Print the parts as listed: filament in layers of 0.2 mm or less, resin of 0.05 mm.
-- Cut the spacer from polyester film of {sheet:g} mm, or of films that add up to it. The sheet
-becomes as thick as this film: measure it with a micrometer.
-- Wash and post-cure the inner mould, then two thin coats of clear acrylic lacquer: resin can keep
-silicone from curing. Try a drop of the silicone on its back first.
-- Fit dry: the ring goes on the plate in one way only. With a dial gauge, the ends of the pins must
-be level with the ring's face within {off:g} mm. If they are lower, sand the face on glass; if
-higher, put paper under the ring.
-- Put release agent on plate, ring, lid and the ends of the pins, and nowhere else. Stick clear film
-on the lid: it makes the sole smooth.
-- Weigh {half_body:.2f} g of each part of {body} (scale of 0.01 g), mix for three minutes and degas.
-It must be poured within {pot_body:.0f} minutes.
-"""
-_MIDDLE = {
-    'large': """- Fill the recess of the plate and heap up {heap:.1f} g between the pins. Push the
-bone over the pins until it lies on the plate: silicone must come up around every pin. (From above
-it would not run down there in time.)
-- Set the ring, pour from one side until the pins are covered, and degas again.
-""",
-    'small': """- Set the ring, pour around the pins until they are covered, degas, lower the lid without
-the spacer from one side, weigh it down with 1 kg, and leave it for {cure_body:.0f} hours at 23 °C.
-- Take off the lid, and leave the body on its pins. Wipe the ends of the pins clean, and put release
-agent on them alone; clean the body with alcohol.
-- Weigh {half_sheet:.2f} g of each part of {sheet_of}, mix for three minutes and degas. It must be
-poured within {pot_sheet:.0f} minutes: over the body, and degas again.
-""",
-}
-_LAST = """- Lay the spacer on the ring, lower the lid from one side, weigh it down with 1 kg, and leave it
-for {cure_sheet:.0f} hours at 23 °C.
-- Take off lid and spacer, draw the ring off towards the sole, then the inner mould straight along
-its pins, slowly: air must get in, or suction tears the sheet. Trim the vents.
-- {close} with {screws} screws M{screw:g} until they touch: this squeezes the seal by a fifth.
-- Tap the hole of the cap to M5, screw in the fitting of the hose with sealant.
-- Under water at a tenth of the ceiling: no bubbles, and every pad rises. Then the test piece: fill
-measurements.csv at the bench, and run pad calibrate."""
-_CLOSE = {
-    'large': 'Screw the cap on the bone',
-    'small': 'Put the retainer over the sole up to the flange, and screw the cap on it',
-}
 
 
 def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
@@ -167,7 +102,7 @@ def rows(parts: Mapping[str, Part]) -> list[list[str]]:
             size = ' × '.join(f'{box[k + 3] - box[k]:.1f}' for k in range(3))
             values = f'{volume:.2f}', f'{1e-3 * volume * DENSITY[part.made]:.1f}'
             faces = str(part.solid.num_tri())
-            found.append([part.name, part.made, size, *values, faces, _ON_BED[part.name]])
+            found.append([part.name, part.made, size, *values, faces, part.bed])
     return found
 
 
@@ -175,8 +110,8 @@ def measurements(made: Plan) -> str:
     """Return the table to fill at the bench, which ``pad calibrate`` reads."""
     shares = (0.4, 0.55, 0.7, 0.85, 0.95, 0.7, 0.85, 0.95)  # five heights, three limits
     return (
-        f'# One pad of {made.foot.source}. Fill in heights (dial gauge) and force limits (scale),\n'
-        '# delete rows without a value, then:\n'
+        f'# One pad of {made.foot.source}. Fill in heights (dial gauge) and force limits\n'
+        '# (scale), delete rows without a value, then:\n'
         '# pad calibrate measurements.csv --foot as_made.yaml --out my_foot.yaml\n'
         'pressure [kPa], height [mm], force_limit [N]\n'
     ) + ''.join(f'{1e-3 * share * ceiling_of(made):.3g}, ,\n' for share in shares)
@@ -194,8 +129,7 @@ def _page(made: Plan, parts: Mapping[str, Part], views: str) -> str:
         views,
         '<h2>Parts to print and to cut</h2>' + table(HEADS, escaped, range(3, 6)),
         '<h2>Silicone</h2>' + _weighed(made, parts),
-        '<h2>Work</h2><ol>' + ''.join(f'<li>{step}</li>' for step in _work(made, parts)) + '</ol>',
-        '<h2>What goes wrong</h2>' + plain_table(_FAULTS),
+        *_work(made, parts),
         '<h2>What to expect</h2>' + _expectations(made),
     ]
     return page(title, sections)
@@ -211,8 +145,8 @@ def _weighed(made: Plan, parts: Mapping[str, Part]) -> str:
     return table(_SILICONE, body, range(1, 6))
 
 
-def _work(made: Plan, parts: Mapping[str, Part]) -> list[str]:
-    """Return the steps of the work."""
+def _work(made: Plan, parts: Mapping[str, Part]) -> Iterator[str]:
+    """Yield the steps of the work, and what goes wrong, from ``config/moulds``."""
     weigh, r = batches(made, parts), made.r
     lined = made.foot.pads * (r['hole'] ** 2 - r['pad'] ** 2) * made.set['bone']
     values: dict[str, object] = {
@@ -221,16 +155,16 @@ def _work(made: Plan, parts: Mapping[str, Part]) -> list[str]:
         'sheet_of': made.sheet.name,
         'body': made.body.name,
         'heap': 1e-6 * math.pi * (lined + r['gasket'] ** 2) * weigh[-1].casting.density,
-        'close': _CLOSE[made.process],
-        'screws': made.screws,
-        'screw': made.set['screw'],
+        'screws': f'{made.screws} screws M{made.set["screw"]:g}',
     }
     for name, batch in (('sheet', weigh[0]), ('body', weigh[-1])):
         values[f'half_{name}'] = 500.0 * batch.mixed
         values[f'pot_{name}'] = batch.casting.pot_life / 60.0
         values[f'cure_{name}'] = batch.casting.cure_time / 3600.0
-    text = html.escape((_FIRST + _MIDDLE[made.process] + _LAST).format(**values), quote=False)
-    return text.removeprefix('- ').split('\n- ')
+    path = shared_folder() / 'moulds' / f'{made.process}.md'
+    for part in path.read_text(encoding='utf-8').format(**values).split('## ')[1:]:
+        title, *steps = html.escape(part, quote=False).strip().split('\n- ')
+        yield f'<h2>{title}</h2><ol>' + ''.join(f'<li>{step}</li>' for step in steps) + '</ol>'
 
 
 def _expectations(made: Plan) -> str:
@@ -245,12 +179,10 @@ def _expectations(made: Plan) -> str:
         f' {mass:.3f} g; 0.01 g are {1.0 / mass:.1f} % of it. '
     )
     if made.process == 'small':
-        words += (
-            f'The sole has no bone: as a plate it bulges by {made.bulge:.2g} mm at the ceiling.'
-        )
+        words += f'As a plate, the sole bulges by {made.bulge:.2g} mm at the ceiling.'
     else:
         words += (
-            f'Only {made.z["bone"]:.1f} mm of silicone are under the bone, so that it holds the rims'
-            f' of the pads; {foot.source} has {1e3 * foot.sole_thickness:g} mm, which land softer.'
+            f'Only {made.z["bone"]:.1f} mm of silicone are under the bone, to hold the rims of'
+            f' the pads; {foot.source} has {1e3 * foot.sole_thickness:g} mm, which land softly.'
         )
     return table(head, body, range(6)) + f'<p>{html.escape(words)}</p>'
