@@ -164,7 +164,11 @@ def _work(made: Plan, parts: Mapping[str, Part]) -> Iterator[str]:
     path = shared_folder() / 'moulds' / f'{made.process}.md'
     for part in path.read_text(encoding='utf-8').format(**values).split('## ')[1:]:
         title, *steps = html.escape(part, quote=False).strip().split('\n- ')
-        yield f'<h2>{title}</h2><ol>' + ''.join(f'<li>{step}</li>' for step in steps) + '</ol>'
+        yield (
+            f'<h2>{title.strip()}</h2><ol>'
+            + ''.join(f'<li>{step}</li>' for step in steps)
+            + '</ol>'
+        )
 
 
 def _expectations(made: Plan) -> str:
