@@ -13,7 +13,6 @@ For example:
 from __future__ import annotations
 
 import io
-import json
 import math
 import pathlib
 import re
@@ -21,13 +20,15 @@ import shutil
 import subprocess
 import tempfile
 import time
+import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import matplotlib
 import numpy as np
 
-from ros_pad.commands.command import print_table
+from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import names
 from ros_pad.contact import Foot, Material, Pad
@@ -37,8 +38,9 @@ from ros_pad.errors import InvalidInput
 from ros_pad.making import Part, Plan, build, plan
 from ros_pad.making.files import stl
 from ros_pad.making.solids import Solid, as_printed
-from ros_pad.reports.mould_drawings import assembled, moulded
+from ros_pad.reports.mould_drawings import assembled, exploded, moulded
 from ros_pad.reports.moulds import PRINTED, test_piece
+from ros_pad.reports.style import STYLE
 from studies import command
 
 FEET = ('large37', 'large331', 'small217')
@@ -297,70 +299,76 @@ def judged(foot: Foot) -> dict[str, Any]:
     return {'foot': foot.source, 'process': made.process, 'faults': wrong, 'build_s': spent}
 
 
-_SLICER = (
-    *('prusa-slicer', '--export-gcode', '--layer-height', '0.2', '--filament-density', '1.04'),
-    *('--bed-shape', '0x0,250x0,250x210,0x210'),
-)
-
-
 def sliced(part: Part) -> dict[str, str]:
-    """Return layers, time and mass of a part by PrusaSlicer, as it tells them."""
-    with tempfile.TemporaryDirectory() as folder:
-        path, code = pathlib.Path(folder) / 'part.stl', pathlib.Path(folder) / 'part.gcode'
+    """Return layers, time and mass of a part by PrusaSlicer, in its default profiles."""
+    resin = part.made == 'resin'
+    how = ['--export-sla', '--printer-technology', 'SLA', '--initial-layer-height', '0.05']
+    how = how if resin else ['--export-gcode', '--filament-density', '1.04', *_BED]
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        path, out = folder / 'part.stl', folder / ('part.sl1' if resin else 'part.gcode')
         path.write_bytes(stl(as_printed(part)))
+        words = ['prusa-slicer', *how, '--layer-height', '0.05' if resin else '0.2']
         done = subprocess.run(
-            [*_SLICER, '--output', str(code), str(path)],
-            capture_output=True,
-            text=True,
+            [*words, '--output', str(out), str(path)], capture_output=True, text=True
         )
-        if done.returncode:
-            return {'error': done.stderr.strip() or done.stdout.strip()}
-        text = code.read_text()
-    taken = re.search(r'estimated printing time \(normal mode\) = (.*)', text)
-    grams = re.search(r'filament used \[g\] = (.*)', text)
+        if done.returncode or not out.exists():
+            return {'layers': 'error', 'time': done.stderr.strip() or done.stdout.strip()}
+        text = zipfile.ZipFile(out).read('config.ini').decode() if resin else out.read_text()
+    told = dict(re.findall(r'^;? ?(\w[^=\n]*?) = (.*)$', text, re.MULTILINE))
+    if resin:
+        minutes, grams = float(told['printTime']) / 60.0, 1.15 * float(told['usedMaterial'])
+        return {
+            'layers': told['numFast'], 'time': f'{minutes:.0f} min', 'grams': f'{grams:.1f}'
+        }  # fmt: skip
     return {
         'layers': str(text.count(';LAYER_CHANGE')),
-        'time': taken[1] if taken else '',
-        'grams': grams[1] if grams else '',
+        'time': told['estimated printing time (normal mode)'],
+        'grams': told['filament used [g]'],
     }
 
 
+_BED = ('--bed-shape', '0x0,250x0,250x210,0x210')
+
+
 def main(words: Sequence[str]) -> int:
-    """Judge the feet; print a table of all parts, and of what is wrong."""
+    """Judge the feet; write tables and pictures; print all parts, and what is wrong."""
     part = command.parser('moulds', __doc__)
+    command.add_out(part, None)
     command.add_count(part, '--random', 50, 'number of random feet', 0)
     command.add_count(part, '--seed', 3301, 'seed of the random feet', 0)
     options = part.parse_args(words)
-    found: dict[str, Any] = {'parts': [], 'feet': []}
+    found: dict[str, list[dict[str, Any]]] = {'parts': [], 'feet': []}
+    pictures = {}
     with bar('judging', 2.0 * len(FEET) + options.random, 'feet') as progress:
-        done = 0
         for name in FEET:
             whole = plan(Foot.load(name))
             for made in (whole, test_piece(whole)):
                 parts = build(made)
-                found['feet'].append({'foot': made.foot.source, 'faults': faults(made, parts)})
+                verdict = {'foot': made.foot.source, 'faults': faults(made, parts)}
+                found['feet'].append(verdict)
                 found['parts'] += [
                     _row(made, each) for each in parts.values() if each.made != 'air'
                 ]
-                progress(done := done + 1)
+                progress(len(found['feet']))
+            with matplotlib.rc_context(STYLE):
+                pictures[f'moulds_{name}'] = exploded(whole, build(whole)).figure
         for foot in random_feet(options.random, options.seed):
             found['feet'].append(judged(foot))
-            progress(done := done + 1)
-    if options.json:
-        print(json.dumps(found))
-        return 0
-    rows = [[str(value) for value in row.values()] for row in found['parts']]
-    print_table(list(found['parts'][0]), rows, 3)
-    for foot in found['feet']:
-        print(foot['foot'], foot.get('refused') or foot['faults'] or 'no fault', sep=': ')
-    refused = sum('refused' in foot for foot in found['feet'])
-    wrong = sum(bool(foot.get('faults')) for foot in found['feet'])
-    print(f'{len(found["feet"])} feet: {refused} refused, {wrong} with faults')
+            progress(len(found['feet']))
+    command.write(options.out or new_folder(None, 'moulds'), 'moulds', found, pictures)
+    table = command.listed(found['parts'])
+    for one in found['feet']:
+        table += f'\n{one["foot"]}: {one.get("refused") or one["faults"] or "no fault"}'
+    refused = sum('refused' in one for one in found['feet'])
+    wrong = sum(bool(one.get('faults')) for one in found['feet'])
+    table += f'\n{len(found["feet"])} feet: {refused} refused, {wrong} with faults'
+    command.show(options, found, table)
     return 1 if wrong else 0
 
 
 def _row(made: Plan, part: Part) -> dict[str, Any]:
-    row = {
+    row: dict[str, Any] = {
         'foot': made.foot.source,
         'part': part.name,
         'of': part.made,

@@ -257,12 +257,9 @@ def advice(each: Design) -> Iterator[str]:
                 f'{each.pads_needed} pads would be enough, on a sole of radius'
                 f' {each.radius_needed:.3g} m or so.'
             )
-    width = 2.0 * each.pad.radius
-    flat = each.pitch < width
-    if flat or each.touching:
-        what = 'pads overlap even when flat' if flat else 'domes touch one another'
+    if each.touching:
         yield (
-            f'{each.pads} {what}: {width if flat else each.dome_width:.3g} m wide at a pitch of'
+            f'{each.pads} domes touch one another: {each.dome_width:.3g} m wide at a pitch of'
             f' {each.pitch:.3g} m.'
         )
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -52,16 +52,7 @@ _CASTING = (
     Setting('mix', str, 'Ratio of its parts.'),
     Setting('source', str, 'Where these are from.'),
 )
-
-
-class Casting(NamedTuple):
-    """How a silicone is cast, by its maker; the keys of ``casting`` in a material file, SI."""
-
-    density: float
-    pot_life: float
-    cure_time: float
-    mix: str
-    source: str
+"""Settings of ``casting`` in a material file: how a silicone is cast, by its maker."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +78,8 @@ class Material:
         between them. By default the factor itself, twice: no doubt.
     name, doubts : str
         Name or path of the file, and why ``factor_range`` is as wide as it is.
-    casting : Casting, optional
-        How it is cast, by its maker.
+    casting : dict, optional
+        How it is cast, by its maker: density, pot life and so on, SI, as in its file.
 
     Raises
     ------
@@ -111,7 +102,7 @@ class Material:
     factor_range: tuple[float, float] | None = field(default=None, compare=False)
     name: str = field(default='', compare=False)
     doubts: str = field(default='', compare=False)
-    casting: Casting | None = field(default=None, compare=False)
+    casting: dict[str, Any] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         choice('law', self.law, tuple(LAWS))
@@ -172,7 +163,7 @@ class Material:
         factor, casting = factor_in(table), None
         if 'casting' in table:
             with table.table('casting') as part:
-                casting = Casting(**part.values(_CASTING))
+                casting = part.values(_CASTING)
         table.finish()
         try:
             return cls(

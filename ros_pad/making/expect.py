@@ -6,12 +6,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ros_pad.contact import Material, Pad, force_limit, inflate
 from ros_pad.contact.foot_file import foot_text
 from ros_pad.contact.limits import DEFAULT_CRITERION, largest_pressure
-from ros_pad.contact.material import Casting
 from ros_pad.contact.pad import with_constant
 from ros_pad.contact.resistance import DOMED
 from ros_pad.making.plan import Plan
@@ -25,7 +24,7 @@ class Batch(NamedTuple):
     """What to weigh of a silicone: the mass that stays in the foot, and both parts, kg."""
 
     material: Material
-    casting: Casting
+    casting: dict[str, Any]
     mass: float
     mixed: float
 
@@ -81,7 +80,7 @@ def batches(made: Plan, parts: Mapping[str, Part]) -> list[Batch]:
     for material in dict.fromkeys((made.sheet, made.body)):
         assert material.casting is not None
         volume = sum(part.solid.volume() for part in parts.values() if part.made == material.name)
-        mass = 1e-9 * volume * material.casting.density
+        mass = 1e-9 * volume * material.casting['density']
         rows.append(Batch(material, material.casting, mass, max(1.2 * mass, mass + 5e-3)))
     return rows
 

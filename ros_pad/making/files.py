@@ -36,7 +36,7 @@ def stl(solid: Solid) -> bytes:
 
 def three_mf(parts: Iterable[Part]) -> bytes:
     """Return parts as they are printed, side by side, as one 3MF file."""
-    objects, items, left = [], [], 0.0
+    objects, left = [], 0.0
     for number, part in enumerate(parts, 1):
         solid = as_printed(part)
         x, y, _, far, _, _ = solid.bounding_box()
@@ -54,11 +54,11 @@ def three_mf(parts: Iterable[Part]) -> bytes:
             + ''.join(face.format(*each) for each in faces)
             + '</triangles></mesh></object>'
         )
-        items.append(f'<item objectid="{number}"/>')
+    items = ''.join(f'<item objectid="{number}"/>' for number, _ in enumerate(objects, 1))
     model = (
         '<?xml version="1.0" encoding="UTF-8"?><model unit="millimeter" xml:lang="en"'
         f' xmlns="{_3MF}core/2015/02"><resources>{"".join(objects)}</resources>'
-        f'<build>{"".join(items)}</build></model>'
+        f'<build>{items}</build></model>'
     )
     return zipped(_PACKAGE | {'3D/3dmodel.model': model})
 
@@ -68,9 +68,7 @@ def zipped(files: Mapping[str, str | bytes]) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as archive:
         for name, data in files.items():
-            entry = zipfile.ZipInfo(name)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, data)
+            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
     return stream.getvalue()
 
 

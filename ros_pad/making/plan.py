@@ -187,8 +187,8 @@ def _silicones(foot: Foot, process: str) -> tuple[Material, Material]:
     names = foot.silicones if own is None else (own.name, *foot.silicones[1:])
     if len(names) < need or foot.pad.thickness is None:
         raise InvalidInput(
-            f'{foot.source}: thickness and silicones of sheet{" and body" * (need - 1)} are needed,'
-            f' as silicones: [ecoflex_00_20, dragon_skin_30]; not {list(names)}'
+            f'{foot.source}: thickness and silicones of sheet{" and body" * (need - 1)} are'
+            f' needed, as silicones: [ecoflex_00_20, dragon_skin_30]; not {list(names)}'
         )
     found = [Material.load(name) for name in names[:need]]
     for each in found:

@@ -317,12 +317,8 @@ def _pitch(inputs: Inputs, free: Inflated | None, parts: _Parts) -> float:
     if free is not None and free.height > radius:
         width = 2.0 * free.sphere_radius
     if pitch < width:
-        what = 'pads overlap' if pitch < 2.0 * radius else 'free domes touch one another'
-        parts.note(
-            'pads',
-            f'in a hexagonal pattern the {what}: they are {1e3 * width:.3g} mm wide at a pitch of'
-            f' {1e3 * pitch:.3g} mm',
-        )
+        words = f'free domes, {1e3 * width:.3g} mm wide, touch one another at a pitch of'
+        parts.note('pads', f'{words} {1e3 * pitch:.3g} mm')
     return pitch
 
 

@@ -153,7 +153,11 @@ def exploded(made: Plan, parts: Mapping[str, Part]) -> Drawn:
     mould = [part for part in moulded(parts) if part.name not in _CAST]
     figure = Figure(figsize=(11.0, 8.5))
     for left, title, stack in (
-        (0.0, 'The mould, sole up', [part._replace(solid=_turned(part)) for part in mould]),
+        (
+            0.0,
+            'The mould, sole up',
+            [part._replace(solid=part.solid.rotate(_OVER)) for part in mould],
+        ),
         (0.5, 'The foot, sole down', assembled(parts)),
     ):
         axes = figure.add_axes((left, 0.0, 0.5, 0.95))
@@ -174,11 +178,8 @@ _TURN, _TILT = math.radians(-60.0), math.radians(28.0)
 _RIGHT = np.array([-math.sin(_TURN), math.cos(_TURN), 0.0])
 _EYE = np.array([math.cos(_TURN), math.sin(_TURN), math.tan(_TILT)]) * math.cos(_TILT)
 _UP = np.cross(_EYE, _RIGHT)
+_OVER = (180.0, 0.0, 0.0)
 _LIGHT = np.array([0.25, -0.45, 0.86])
-
-
-def _turned(part: Part) -> Solid:
-    return part.solid.rotate((180.0, 0.0, 0.0))
 
 
 def _stack(axes: Axes, parts: Sequence[Part]) -> None:
@@ -196,9 +197,8 @@ def _stack(axes: Axes, parts: Sequence[Part]) -> None:
         words, middle = part.name + _CAST.get(part.name, ''), (level + 0.5 * (high - low)) * _UP[2]
         axes.text(1.06 * wide, middle, words, va='center')
         level += high - low + 0.42 * wide
+    axes.margins(0.25, 0.02)
     axes.autoscale_view()
-    left, right = axes.get_xlim()
-    axes.set_xlim(left, right + 0.25 * (right - left))
 
 
 def _triangles(solid: Solid, part: Part) -> tuple[Array, Array]:

@@ -138,8 +138,8 @@ def _page(made: Plan, parts: Mapping[str, Part], views: str) -> str:
 def _weighed(made: Plan, parts: Mapping[str, Part]) -> str:
     body = []
     for material, casting, mass, mixed in batches(made, parts):
-        times = f'{casting.pot_life / 60.0:.0f}', f'{casting.cure_time / 3600.0:.0f}'
-        words = html.escape(f'{casting.mix}, at 23 °C; read the label. {casting.source}')
+        times = f'{casting["pot_life"] / 60.0:.0f}', f'{casting["cure_time"] / 3600.0:.0f}'
+        words = html.escape(f'{casting["mix"]}, at 23 °C; read the label. {casting["source"]}')
         half = f'{500.0 * mixed:.2f}'
         body.append([html.escape(material.name), f'{1e3 * mass:.2f}', half, half, *times, words])
     return table(_SILICONE, body, range(1, 6))
@@ -154,13 +154,13 @@ def _work(made: Plan, parts: Mapping[str, Part]) -> Iterator[str]:
         'off': made.set['tolerance'],
         'sheet_of': made.sheet.name,
         'body': made.body.name,
-        'heap': 1e-6 * math.pi * (lined + r['gasket'] ** 2) * weigh[-1].casting.density,
+        'heap': 1e-6 * math.pi * (lined + r['gasket'] ** 2) * weigh[-1].casting['density'],
         'screws': f'{made.screws} screws M{made.set["screw"]:g}',
     }
     for name, batch in (('sheet', weigh[0]), ('body', weigh[-1])):
         values[f'half_{name}'] = 500.0 * batch.mixed
-        values[f'pot_{name}'] = batch.casting.pot_life / 60.0
-        values[f'cure_{name}'] = batch.casting.cure_time / 3600.0
+        values[f'pot_{name}'] = batch.casting['pot_life'] / 60.0
+        values[f'cure_{name}'] = batch.casting['cure_time'] / 3600.0
     path = shared_folder() / 'moulds' / f'{made.process}.md'
     for part in path.read_text(encoding='utf-8').format(**values).split('## ')[1:]:
         title, *steps = html.escape(part, quote=False).strip().split('\n- ')
@@ -174,13 +174,13 @@ def _work(made: Plan, parts: Mapping[str, Part]) -> Iterator[str]:
 def _expectations(made: Plan) -> str:
     foot, disc = made.foot, math.pi * made.r['sole'] ** 2 * made.z['sheet']
     head, *body = expected(made)
-    mass = 1e-6 * batches(made, {})[0].casting.density * disc
+    mass = 1e-6 * batches(made, {})[0].casting['density'] * disc
     words = (
         f'By the model of the foot, for a sheet that is {made.set["tolerance"]:g} mm off. All pads'
         ' share one plenum: the thinnest takes all the air once it balloons. The ceiling that'
-        f' follows is {ceiling_of(made):.0f} Pa (that of {foot.source}: {foot.ceiling:.0f} Pa), and'
-        f' as_made.yaml has it. A disc of the sheet of ⌀ {2.0 * made.r["sole"]:.0f} mm weighs'
-        f' {mass:.3f} g; 0.01 g are {1.0 / mass:.1f} % of it. '
+        f' follows, {ceiling_of(made):.0f} Pa, is in as_made.yaml ({foot.source}: {foot.ceiling:.0f}'
+        f' Pa). A disc of the sheet of ⌀ {2.0 * made.r["sole"]:.0f} mm weighs {mass:.3f} g; 0.01 g'
+        f' are {1.0 / mass:.1f} % of it. '
     )
     if made.process == 'small':
         words += f'As a plate, the sole bulges by {made.bulge:.2g} mm at the ceiling.'

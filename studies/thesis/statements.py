@@ -17,6 +17,7 @@ from ros_pad.contact.material import Material
 from ros_pad.contact.meniscus import WATER, capillary_pull, hysteresis_force, meniscus
 from ros_pad.contact.pad import LARGE_PAD, Pad
 from ros_pad.contact.resistance import Foot
+from ros_pad.making import build, plan
 from studies.thesis.explained import MINIMAL, Claim, claim
 from studies.thesis.sole import CELLS, FLAT, TENSION
 
@@ -139,12 +140,23 @@ def _feet() -> tuple[Claim, ...]:
     small = Foot.load('small217')
     carried = small.pads * float(force_limit(small.pad, small.ceiling, small.limit))
     robot = 2.09 * 9.81 / 3.0
+    body, bone = plan(small), plan(Foot.load('large37'))
+    bulges = [body.bulge * p / small.ceiling for p in WALKED]
     return (
         _balloons('large', 1.5e-3, 0.4e-3, '5.1.1'),
         _balloons('small', 0.5e-3, 0.2e-3, '5.1.2'),
         claim('the small foot is', (carried, robot), None, pads=small.pads, carried=carried,
               ceiling=1e-3 * small.ceiling, robot=robot),
-        claim('at high pressure the', (), None),
+        claim('at high pressure the', bulges, max(bulges) > 1e3 * small.pad.radius,
+              bulges=bulges, walked=[1e-3 * p for p in WALKED],
+              body=body.z['top'] - body.z['sheet']),
+        claim('a printed bone with', (2.0 * bone.r['pad'], bone.z['sheet']),
+              {'bone', 'cap', 'inner mould', 'ring', 'lid'} <= {*build(bone)},
+              chamber=2.0 * bone.r['pad'], sheet=bone.z['sheet']),
+        claim('a body with cylindrical', (2.0 * body.r['pad'], body.z['sheet']),
+              (round(2.0 * body.r['pad'], 6), round(body.z['sheet'], 6)) == (1.0, 0.2),
+              chamber=2.0 * body.r['pad'], sheet=body.z['sheet'], silicones=small.silicones),
+        claim('drawings of the moulds', (), None),
     )  # fmt: skip
 
 
