@@ -30,6 +30,7 @@ EXTRAS = {
     'distributed': 'sweep',
     'pyarrow': 'sweep',
     'meshio': 'mesh',
+    'manifold3d': 'make',
     'nicegui': 'explore',
     'starlette': 'explore',
 }

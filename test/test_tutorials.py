@@ -72,11 +72,12 @@ def test_own_foot(tmp_path, monkeypatch, capsys):
     (table,) = (each for each in blocks(page) if 'pressure [kPa]' in each)
     (tmp_path / 'my_pads.csv').write_text(table, encoding='utf-8')
     by_name = {words[1]: words[1:] for words in commands(page)}
-    for name, first in (('calibrate', 'constant'), ('contact', 'pad of'), ('design', '6.8 N')):
+    firsts = {'mould': 'part', 'calibrate': 'constant', 'contact': 'pad of', 'design': '6.8 N'}
+    for name, first in firsts.items():
         assert cli.main(by_name[name]) == 0
         shown(capsys.readouterr().out, page, first)
     written = {path.name for path in tmp_path.iterdir()}
-    assert written == {'my_pads.csv', 'my_foot.yaml', 'my_foot.png', 'design.png'}
+    assert written == {'my_pads.csv', 'my_foot.yaml', 'my_foot.png', 'design.png', 'my_moulds'}
 
 
 def test_own_robot(tmp_path, monkeypatch, capsys):

@@ -277,7 +277,7 @@ def design(
     >>> from ros_pad.contact import design
     >>> sole = design(load=4.0, area=9e-4)
     >>> sole.pads, round(sole.pressure), round(sole.reachable_load, 1), sole.carried
-    (51, 39125, 19.5, True)
+    (31, 50606, 11.8, True)
     """
     instance('pad', pad, Pad)
     load = number('load', load, 'N', above=True)

@@ -20,7 +20,7 @@ RAW = Material.load('dragon_skin_10')
 
 
 def one(load, material=NEO, thickness=THICKNESS, **rules):
-    (found,) = candidates(load, AREA, [material], [thickness], RADIUS, **rules)
+    (found,) = candidates(load, AREA, [material], [thickness], RADIUS, pads=20, **rules)
     return found
 
 

@@ -59,14 +59,15 @@ def test_rise_needs_a_liquid_that_wets():
 @pytest.mark.parametrize('criterion', ['thickness', 'measured'])
 def test_a_design_adds_up(criterion):
     sole = design(7.0, SOLE, criterion=criterion, margin=1.5)
-    assert sole.pads == math.floor(pads_in(SOLE, LARGE_PAD.radius))
+    # Within (17 - 1.5 - 2.1)/4.5 = 2.98 steps of a hexagonal lattice: 1 + 6 + 6 + 6 + 12 points.
+    assert sole.pads == 31 < pads_in(SOLE, LARGE_PAD.radius)
     assert sole.load_per_pad * sole.pads == pytest.approx(7.0)
     assert force_limit(LARGE_PAD, sole.pressure, criterion) == pytest.approx(
         1.5 * sole.load_per_pad, rel=1e-10
     )
     reach = sole.pads * force_limit(LARGE_PAD, 90e3, criterion) / 1.5
     assert sole.reachable_load == pytest.approx(reach)
-    assert sole.pitch**2 * math.sqrt(3) / 2 * sole.pads == pytest.approx(SOLE)
+    assert sole.pitch == pytest.approx(13.4e-3 / math.sqrt(7.0))
     assert sole.carried
     assert not sole.touching
 
@@ -106,20 +107,25 @@ def test_what_is_asked_beyond_the_model_is_not_carried():
 def test_pads_as_built():
     built = design(7.0, SOLE, pads=37)
     assert built.pads == 37
-    assert built.pitch > design(7.0, SOLE).pitch
+    assert built.pitch == pytest.approx(13.4e-3 / 3.0)
     assert built.rise_height < rise_height(1.5e-3)
     packed = design(7.0, SOLE, pads=60)
     assert math.isnan(packed.rise_height)  # 60 domes with spheres of 1.5 radii do not fit
-    assert not packed.touching  # but domes at this pressure do fit
-    assert packed.pads_without_touching >= 60
+    # Four rings, as 61 have: 3.35 mm from one another, wider than flat domes.
+    assert packed.pitch == pytest.approx(13.4e-3 / 4.0, rel=0.02)
+    assert packed.touching == (packed.dome_width > packed.pitch)
+    assert 31 <= packed.pads_without_touching <= 73
     for pads in (0, -3, 129, 2.0, True, '37'):
         with pytest.raises(InvalidInput, match='from 1 to 128'):
             design(7.0, SOLE, pads=pads)
 
 
-def test_whole_cells_are_all_counted():
-    for pads in range(1, 200):
-        area = pads * 4.5 * math.sqrt(3.0) * 1.5e-3**2
-        assert design(1.0, area).pads == pads
+def test_whole_shells_are_all_counted():
+    # Points of a hexagonal lattice up to a distance, by its square.
+    shells = {1: 7, 3: 13, 4: 19, 7: 31, 9: 37, 12: 43, 13: 55, 16: 61, 64: 241, 100: 367}
+    for square, pads in shells.items():
+        radius = 4.5e-3 * math.sqrt(square) + 3.6e-3
+        assert design(1.0, math.pi * radius**2).pads == pads
+        assert design(1.0, math.pi * (radius - 1e-6) ** 2).pads < pads
     with pytest.raises(InvalidInput, match='area'):
         design(1.0, 17e-6)
