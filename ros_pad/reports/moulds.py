@@ -58,7 +58,8 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
         When manifold3d is not installed.
     """
     parts, piece = build(made), test_piece(made)
-    found = _meshes(made, parts, '') | _meshes(piece, build(piece), 'test_piece/')
+    single = build(piece)
+    found = _meshes(made, parts, '') | _meshes(piece, single, 'test_piece/')
     progress(1)
     with matplotlib.rc_context(STYLE):
         sheet, views = drawing(made, parts), exploded(made, parts)
@@ -66,7 +67,7 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
         found |= {f'drawing.{kind}': rendered(sheet, kind, dpi=150) for kind in ('svg', 'pdf')}
         progress(4)
         texts = {
-            'making.html': _page(made, parts, section(views)),
+            'making.html': _page(made, parts, section(views), _weighed(piece, single)),
             'measurements.csv': measurements(made),
             'as_made.yaml': as_made(made, parts),
         }
@@ -120,7 +121,7 @@ def measurements(made: Plan) -> str:
 # --- the page ------------------------------------------------------------------------------------
 
 
-def _page(made: Plan, parts: Mapping[str, Part], views: str) -> str:
+def _page(made: Plan, parts: Mapping[str, Part], views: str, single: str) -> str:
     escaped = [[html.escape(cell) for cell in row] for row in rows(parts)]
     title = f'Making {made.foot.source}'
     sections = [
@@ -128,7 +129,7 @@ def _page(made: Plan, parts: Mapping[str, Part], views: str) -> str:
         warning(_UNTRIED),
         views,
         '<h2>Parts to print and to cut</h2>' + table(HEADS, escaped, range(3, 6)),
-        '<h2>Silicone</h2>' + _weighed(made, parts),
+        f'<h2>Silicone</h2>{_weighed(made, parts)}<p>For the test piece:</p>{single}',
         *_work(made, parts),
         '<h2>What to expect</h2>' + _expectations(made),
     ]
@@ -178,9 +179,9 @@ def _expectations(made: Plan) -> str:
     words = (
         f'By the model of the foot, for a sheet that is {made.set["tolerance"]:g} mm off. All pads'
         ' share one plenum: the thinnest takes all the air once it balloons. The ceiling that'
-        f' follows, {ceiling_of(made):.0f} Pa, is in as_made.yaml ({foot.source}: {foot.ceiling:.0f}'
-        f' Pa). A disc of the sheet of ⌀ {2.0 * made.r["sole"]:.0f} mm weighs {mass:.3f} g; 0.01 g'
-        f' are {1.0 / mass:.1f} % of it. '
+        f' follows, {ceiling_of(made):.0f} Pa, is in as_made.yaml, for {foot.ceiling:.0f} Pa of'
+        f' {foot.source}. A disc of the sheet of ⌀ {2.0 * made.r["sole"]:.0f} mm weighs {mass:.3f} g;'
+        f' 0.01 g of that are {1.0 / mass:.1f} %. '
     )
     if made.process == 'small':
         words += f'As a plate, the sole bulges by {made.bulge:.2g} mm at the ceiling.'
