@@ -51,7 +51,7 @@ SETTINGS = (
     _length('fitting', 4.2e-3, 'Hole for the fitting of the hose: to be tapped to M5.'),
     Setting('mount_holes', 3, 'Holes in the cap for the leg.', '', 0, 24),
     _length('mount_hole', 2.5e-3, 'Their diameter: screws of 3 mm cut their thread.'),
-    _length('mount_circle', 20e-3, 'Diameter of the circle on which they are.'),
+    _length('mount_circle', 0.0, 'Diameter of their circle; 0: 20 mm, or what there is room for.'),
 )
 """Limits of printers, walls, screws and holes, SI."""
 
@@ -160,6 +160,7 @@ def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None
         use['bone'] = use['bone'] or max(8.0, 0.5 * math.ceil(2.0 * bone_needed(made)))
     made.z.update(_heights(made))
     made.r.update(_radii(made, reach_of(places)))
+    use['mount_circle'] = use['mount_circle'] or min(20.0, _mounts(made)[1])
     wrong = [
         f'{name} is {value:.3g} mm, {"at least" if value < low else "at most"}'
         f' {low if value < low else high:.3g} mm is needed'
@@ -265,9 +266,14 @@ def _limits(made: Plan) -> Iterator[tuple[str, float, float, float]]:
         yield 'sole_thickness', z['top'], z['sheet'] + max(3.0, body), math.inf
         yield 'rim', use['rim'], 0.8, math.inf
     if use['mount_holes'] and made.foot.pads > 1:
-        half = 0.5 * use['mount_hole'] + use['wall']
-        least, most = 0.5 * use['fitting'] + half, r['screws'] - r['screw'] - half
-        yield 'mount_circle', use['mount_circle'], 2.0 * least, 2.0 * most
+        yield 'mount_circle', use['mount_circle'], *_mounts(made)
+
+
+def _mounts(made: Plan) -> tuple[float, float]:
+    """Return the least and the largest circle of the holes for the leg, mm in diameter."""
+    use, r = made.set, made.r
+    walls = use['mount_hole'] + 2.0 * use['wall']
+    return use['fitting'] + walls, 2.0 * (r['screws'] - r['screw']) - walls
 
 
 def _plate(pressure: float, radius: float, solid: float) -> float:

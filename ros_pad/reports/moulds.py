@@ -180,7 +180,7 @@ def _expectations(made: Plan) -> str:
         f'By the model of the foot, for a sheet that is {made.set["tolerance"]:g} mm off. All pads'
         ' share one plenum: the thinnest takes all the air once it balloons. The ceiling that'
         f' follows, {ceiling_of(made):.0f} Pa, is in as_made.yaml, for {foot.ceiling:.0f} Pa of'
-        f' {foot.source}. A disc of the sheet of ⌀ {2.0 * made.r["sole"]:.0f} mm weighs {mass:.3f} g;'
+        f' {foot.source}. A disc of the sheet of ⌀ {2.0 * made.r["sole"]:.0f} mm has {mass:.3f} g;'
         f' 0.01 g of that are {1.0 / mass:.1f} %. '
     )
     if made.process == 'small':

@@ -217,7 +217,10 @@ def test_the_command_writes_all_files(tmp_path, capsys):
         *('as_made.yaml', 'measurements.csv', 'test_piece/bone.stl', 'test_piece/spacer.dxf'),
     }
     written = (folder / 'making.html').read_text()
-    assert 'Push the bone' in written and '{' not in written.split('<h2>Work</h2>')[1].split('<h2>')[0]
+    assert (
+        'Push the bone' in written
+        and '{' not in written.split('<h2>Work</h2>')[1].split('<h2>')[0]
+    )
     assert cli.main(words) == 2
     assert 'exists already' in capsys.readouterr().err
     assert cli.main(['mould', 'large19']) == 2

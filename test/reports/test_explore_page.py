@@ -14,6 +14,7 @@ import time
 import urllib.error
 import urllib.parse
 import urllib.request
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -193,6 +194,26 @@ def test_the_foot_file_walks(page, tmp_path, capsys):
     options = ('--no-ros', '--no-compare', '--json', '--out', str(tmp_path / 'walk'))
     assert cli.main(['run', *walk, *options]) == 0
     assert json.loads(capsys.readouterr().out)
+
+
+def test_the_moulds_are_those_of_the_command_or_refused_in_words(page, tmp_path):
+    pytest.importorskip('manifold3d')
+    typed(page, 'pads', '7')
+    typed(page, 'sole_radius', '9')
+    with page.expect_download(timeout=LONGEST) as loading:
+        page.get_by_role('button', name='Moulds').click()
+    loading.value.save_as(tmp_path / 'moulds.zip')
+    with zipfile.ZipFile(tmp_path / 'moulds.zip') as archive:
+        archive.extractall(tmp_path / 'page')
+    foot = tmp_path / 'page' / 'my_foot.yaml'
+    assert Foot.load(foot).pads == 7
+    assert cli.main(['mould', str(foot), '--out', str(tmp_path / 'command')]) == 0
+    for name in ('bone.stl', 'spacer.dxf', 'test_piece/cap.stl'):
+        made = [(tmp_path / each / name).read_bytes() for each in ('page', 'command')]
+        assert made[0] == made[1]
+    typed(page, 'sole_radius', '7')
+    page.get_by_role('button', name='Moulds').click()
+    page.get_by_text('sole_radius of at least').wait_for()
 
 
 def test_nothing_is_loaded_from_elsewhere(page):
