@@ -45,10 +45,9 @@ def assembled(parts: Mapping[str, Part]) -> list[Part]:
 def drawing(made: Plan, parts: Mapping[str, Part]) -> Figure:
     """Return the drawing with dimensions, mm: mould, foot, one pad, and a view from the floor."""
     figure, z, r = Figure(figsize=(16.0, 10.5)), made.z, made.r
-    figure.suptitle(
-        f'{made.foot.source}, {made.process} process, {made.foot.pads} pads of {made.sheet.name}'
-        f' on {made.body.name}. Millimetres; sections through the axis, sole down'
-    )
+    silicones = ' on '.join(dict.fromkeys((made.sheet.name, made.body.name)))
+    title = f'{made.foot.source}, {made.process} process, {made.foot.pads} pads of {silicones}'
+    figure.suptitle(f'{title}. Millimetres; sections through the axis, sole down')
     grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, bottom=0.05, top=0.93, wspace=0.12)
     axes = figure.add_subplot(grid[0, 0])
     _cut(axes, moulded(parts), 'In the mould')
