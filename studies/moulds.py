@@ -97,20 +97,23 @@ def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]
     seal = _cone(0.0, 1.0 if large else 2.0, r['gasket'], r['gasket'] - slope)
     wall = _cone(z['sheet'], z['flange'], r['sole'], r['bore'])
     pins = pads * _cone(z['sheet'], z['face'], r['pad'], r['root'])
-    pegs, sockets = 3.0 * disc(1.5, 0.0, 3.0), 3.0 * disc(1.5 + gap, 0.0, 3.5)
-    mounts = use['mount_holes'] * disc(0.5 * use['mount_hole'], 0.0, 4.5) * (pads > 1)
+    pegs = 3.0 * disc(1.5, 0.0, 3.0)
+    mounts = use['mount_holes'] * disc(0.5 * use['mount_hole'], 0.0, 4.5)
     vents = 12.0 * 0.3 * 2.5  # up to the groove
-    hollow = disc(r['flange'] + gap if large else r['gasket'], z['flange'], z['top'])
+    hollow = disc(r['flange'] + gap, z['flange'] - 0.5 * gap, z['top'])
+    hollow = hollow if large else disc(r['gasket'], z['flange'], z['top'])
     formulas = {
-        'lid': disc(r['outer'], -4.0, 0.0) + pegs + 3.0 * disc(1.5, 0.0, z['sheet']),
+        'lid': disc(r['outer'], -4.0, 0.0) - 3.0 * disc(1.5 + gap, -4.0, 0.0),
         'spacer': disc(r['outer'], 0.0, z['sheet'])
         - disc(r['sole'], 0.0, z['sheet'])
         - 3.0 * disc(1.5 + gap, 0.0, z['sheet']),
         'ring': disc(r['outer'], z['sheet'], z['top'])
         - wall
+        + (disc(r['bore'], 0.0, 0.5 * gap) if large else 0.0)
         - hollow
         - vents
-        - 2.0 * sockets
+        - 3.0 * disc(1.5 + gap, 0.0, 3.5)
+        - 3.0 * disc(1.5 + gap, 0.0, 4.5)
         + disc(r['sole'] + 2.5, 0.0, 1.0)
         - disc(r['sole'] + 4.0, 0.0, 1.0),
         'inner mould': disc(r['outer'], z['top'], z['face'] + 5.0) + pins + pegs,
@@ -128,17 +131,19 @@ def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]
     if large:
         core = disc(r['bone'], z['bone'], z['flange'])
         holes = pads * disc(r['hole'], z['bone'], z['top'])
-        screws = made.screws * disc(r['screw'], z['flange'], z['top'])
+        screws = made.screws * disc(r['thread'], z['flange'], z['top'])
         formulas['bone'] = core + disc(r['flange'], z['flange'], z['top']) - screws - holes
         formulas['silicone'] = sheet + wall - core + holes + seal - pins
-        formulas['inner mould'] += 3.0 * disc(r['screw'] - 0.5 * gap, z['flange'] + 0.5, z['face'])
+        formulas['inner mould'] += 3.0 * disc(
+            r['thread'] - 0.5 * gap, z['flange'] + 0.5, z['face']
+        )
         formulas['inner mould'] -= seal
     else:
         low = z['flange'] - 3.0
         formulas |= {'sheet': sheet, 'body': wall + seal - pins}
         formulas['retainer'] = (
             disc(r['flange'], low, z['stop'])
-            - made.screws * disc(r['screw'], low, z['stop'])
+            - made.screws * disc(r['thread'], low, z['stop'])
             - disc(r['bore'] + gap, low, z['flange'])
             - disc(r['gasket'] + 1.0, z['flange'], z['stop'])
         )
@@ -317,9 +322,8 @@ def sliced(part: Part) -> dict[str, str]:
     told = dict(re.findall(r'^;? ?(\w[^=\n]*?) = (.*)$', text, re.MULTILINE))
     if resin:
         minutes, grams = float(told['printTime']) / 60.0, 1.15 * float(told['usedMaterial'])
-        return {
-            'layers': str(int(told['numFast']) + int(told['numSlow'])), 'time': f'{minutes:.0f} min', 'grams': f'{grams:.1f}'
-        }  # fmt: skip
+        layers = str(int(told['numFast']) + int(told['numSlow']))
+        return {'layers': layers, 'time': f'{minutes:.0f} min', 'grams': f'{grams:.1f}'}
     return {
         'layers': str(text.count(';LAYER_CHANGE')),
         'time': told['estimated printing time (normal mode)'],

@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     from ros_pad.reports import moulds
     from ros_pad.reports.files import save
 
-    with bar('making moulds', 5.0, 'steps') as progress:
+    with bar('making moulds', 3.0, 'steps') as progress:
         found = moulds.files(made, progress)
     for name in found:
         refuse(folder / name, options.force)

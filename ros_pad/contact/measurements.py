@@ -250,7 +250,7 @@ def _kind(where: str, row: dict[str, float]) -> str:
         raise ConfigError(
             f'{where}: a row is a free dome (pressure, height), a pressed dome (pressure, force'
             ' and shape), a force limit (pressure, force_limit) or friction (pressure, load,'
-            f' tangential_force, surface); this one has {given}'
+            f' tangential_force, surface): fill in or delete this one, which has {given}'
         )
     missing = [name for name in _KINDS[kinds[0]][0] if name not in row]
     if not missing and kinds[0] == 'pressed' and not row.keys() & {'height', *shapes}:

@@ -34,19 +34,19 @@ def expected(made: Plan) -> list[tuple[str, ...]]:
 
     The first row has the heads. Above the end of the model a pad balloons, or nothing is known.
     """
-    foot, pressure = made.foot, DOMED * made.foot.ceiling
+    foot, pressure, ceiling = made.foot, DOMED * made.foot.ceiling, ceiling_of(made)
     # A limit that was measured holds for its own pad alone.
     criterion = DEFAULT_CRITERION if foot.limit == 'measured' else foot.limit
     head = 'sheet, mm', 'stiffness, N/m', 'for the same dome, Pa', f'dome at {pressure:.0f} Pa, mm'
     rows: list[tuple[str, ...]] = [
-        (*head, f'limit at {foot.ceiling:.0f} Pa, N', 'balloons or model ends, Pa')
+        (*head, f'limit of a pad at {ceiling:.0f} Pa, N', 'balloons or model ends, Pa')
     ]
     for off in (-1e-3, 0.0, 1e-3):
         thickness = 1e-3 * made.z['sheet'] + off * made.set['tolerance']
         pad, share = _with_sheet(foot.pad, thickness), 1e3 * thickness / made.z['sheet']
         # Arrays have NaN above the end of a model.
         height = 1e3 * float(inflate(pad, [pressure]).height[0])
-        limit = foot.pads * float(force_limit(pad, [foot.ceiling], criterion)[0])
+        limit = float(force_limit(pad, [ceiling], criterion)[0])
         values = ('balloons' if math.isnan(each) else f'{each:.3g}' for each in (height, limit))
         # Of one shape, tension and pressure are in proportion to the thickness.
         first = f'{1e3 * thickness:.3f}', f'{pad.stiffness:.3g}', f'{share * pressure:.0f}'

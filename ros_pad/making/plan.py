@@ -47,7 +47,7 @@ SETTINGS = (
     _length('bone', 0.0, 'Thickness of the bone; 0: as thick as it must be, from 8 mm.'),
     _length('flange', 3e-3, 'Thickness of the flange of the bone.'),
     Setting('load', 0.0, 'Peak load; 0: three times the force limit.', 'N', 0.0, 1e5),
-    _length('screw', 3e-3, 'Diameter of the screws.'),
+    _length('screw', 3e-3, 'Diameter of the screws, which cut their thread in bone or retainer.'),
     _length('fitting', 4.2e-3, 'Hole for the fitting of the hose: to be tapped to M5.'),
     Setting('mount_holes', 3, 'Holes in the cap for the leg.', '', 0, 24),
     _length('mount_hole', 2.5e-3, 'Their diameter: screws of 3 mm cut their thread.'),
@@ -97,6 +97,12 @@ class Plan:
     def screws(self) -> int:
         """Number of screws between cap and bone or retainer: one every 25 mm, at least six."""
         return max(6, math.ceil(2.0 * math.pi * self.r['screws'] / 25.0))
+
+    @property
+    def screw_length(self) -> float:
+        """Length of these screws below their heads, mm: they end inside."""
+        held = self.z['stop'] - self.z['flange'] + (0.0 if 'bone' in self.z else 3.0)
+        return 2.0 * math.floor(0.5 * (self.z['cap'] - self.z['stop'] + held) + 1e-9)
 
     def pegs(self, angles: Sequence[float]) -> list[tuple[float, float]]:
         """Return places of pegs between ring and plate or lid, mm, at angles in degrees."""
@@ -226,6 +232,7 @@ def _radii(made: Plan, reach: float) -> dict[str, float]:
     flange = screws + hole + 2.0
     r = {'pad': pad, 'root': root, 'sole': sole, 'bore': bore, 'plenum': plenum, 'gasket': gasket}
     r |= {'hole': pad + use['lining'], 'bone': sole - use['skin'], 'screw': hole, 'screws': screws}
+    r['thread'] = hole - 0.45
     return r | {'flange': flange, 'outer': flange + use['clearance'] + 6.0}
 
 
@@ -265,7 +272,7 @@ def _limits(made: Plan) -> Iterator[tuple[str, float, float, float]]:
         body = (z['top'] - z['sheet']) * (made.bulge / r['pad']) ** (1.0 / 3.0)
         yield 'sole_thickness', z['top'], z['sheet'] + max(3.0, body), math.inf
         yield 'rim', use['rim'], 0.8, math.inf
-    if use['mount_holes'] and made.foot.pads > 1:
+    if use['mount_holes']:
         yield 'mount_circle', use['mount_circle'], *_mounts(made)
 
 
@@ -273,7 +280,8 @@ def _mounts(made: Plan) -> tuple[float, float]:
     """Return the least and the largest circle of the holes for the leg, mm in diameter."""
     use, r = made.set, made.r
     walls = use['mount_hole'] + 2.0 * use['wall']
-    return use['fitting'] + walls, 2.0 * (r['screws'] - r['screw']) - walls
+    # The fitting is 4 mm wider than its hole.
+    return use['fitting'] + 4.0 + walls, 2.0 * (r['screws'] - r['screw']) - walls
 
 
 def _plate(pressure: float, radius: float, solid: float) -> float:

@@ -89,11 +89,9 @@ class _Builder:
         turns = [2.0 * math.pi * k / count for k in range(0, count, step)]
         return self.at(solid, [(radius * math.cos(a), radius * math.sin(a)) for a in turns])
 
-    def screws(self, low: float, high: float) -> Solid:
-        """Return the holes of the screws."""
-        return self.around(
-            self.cut(self.r['screw'], low, high), self.r['screws'], self.made.screws
-        )
+    def screws(self, name: str, low: float, high: float) -> Solid:
+        """Return the holes of the screws, by the name of their radius."""
+        return self.around(self.cut(self.r[name], low, high), self.r['screws'], self.made.screws)
 
     def pins(self, over: float) -> Solid:
         """Return the pins, which are chambers and channels of the cast, with longer roots."""
@@ -113,7 +111,7 @@ class _Builder:
         solid = self.disc(r['bone'], z['bone'], z['top'])
         solid += self.disc(r['flange'], z['flange'], z['top'])
         solid -= self.at(self.cut(r['hole'], z['bone'], z['top']), self.made.places.tolist())
-        return solid - self.screws(z['flange'], z['top'])
+        return solid - self.screws('thread', z['flange'], z['top'])
 
     def parts(self) -> dict[str, Part]:
         """Return all parts."""
@@ -122,7 +120,7 @@ class _Builder:
         over, end = r['bore'] + self.slope * _OVER, z['flange'] + _OVER
         cast = self.disc(r['sole'], z['sheet'], end, over) + self.seal()
         found = [
-            Part('lid', self.lid(), 'filament', -1, True, 'flat face down, pegs up'),
+            Part('lid', self.lid(), 'filament', -1, False, 'flat'),
             Part('spacer', self.spacer(), 'film', -1, bed='cut from film by spacer.dxf'),
             Part('ring', self.ring(), 'filament', -1, bed='face with the groove down'),
             Part(
@@ -151,7 +149,7 @@ class _Builder:
         z, r = self.z, self.r
         plate = self.disc(r['outer'], z['top'], z['face'] + _PLATE)
         if self.large:
-            dowel = self.disc(r['screw'] - 0.5 * self.gap, z['flange'] + 0.5, z['face'] + 1.0)
+            dowel = self.disc(r['thread'] - 0.5 * self.gap, z['flange'] + 0.5, z['face'] + 1.0)
             step = self.made.screws // 3
             plate -= self.seal(_OVER)
             plate += self.around(dowel, r['screws'], self.made.screws, step)
@@ -161,6 +159,8 @@ class _Builder:
     def ring(self) -> Solid:
         """Return the wall of the mould: its face is flush with the pins' ends."""
         z, r, low, up = self.z, self.r, self.z['sheet'], self.z['flange']
+        # Above the flange of the bone there is air: it must not lift the ring.
+        up -= 0.5 * self.gap if self.large else 0.0
         more = self.slope * _OVER
         wide = r['flange'] + self.gap if self.large else r['gasket']
         solid = self.disc(r['outer'], low, z['top']) - self.disc(wide, up, z['top'] + _OVER)
@@ -171,35 +171,36 @@ class _Builder:
         vent = vent.translate((r['sole'] - _OVER, -0.5, low - _OVER))
         for turn in range(12):
             solid -= vent.rotate((0.0, 0.0, 30.0 * turn + 10.0))
-        for start, end, angles in (
-            (low - _OVER, low + 3.5, self.made.lid_angles),
-            (z['top'] - 3.5, z['top'] + _OVER, self.made.plate_angles),
-        ):
-            solid -= self.at(self.disc(1.5 + self.gap, start, end), self.made.pegs(angles))
-        return solid
+        socket = self.disc(1.5 + self.gap, z['top'] - 3.5, z['top'] + _OVER)
+        solid -= self.at(socket, self.made.pegs(self.made.plate_angles))
+        return solid - self.peg_holes(low, low + 4.0)
 
     def lid(self) -> Solid:
         """Return the flat plate that closes the mould on the floor's side."""
-        pegs = self.at(
-            self.disc(1.5, -1.0, self.z['sheet'] + 3.0), self.made.pegs(self.made.lid_angles)
-        )
-        return self.disc(self.r['outer'], -_LID, 0.0) + pegs
+        return self.disc(self.r['outer'], -_LID, 0.0) - self.peg_holes(-_LID, 0.0)
+
+    def peg_holes(self, low: float, high: float) -> Solid:
+        """Return the holes for the loose pegs of lid, spacer and ring: their faces stay flat."""
+        hole = self.cut(1.5 + self.gap, low, high)
+        return self.at(hole, self.made.pegs(self.made.lid_angles))
 
     def spacer(self) -> Solid:
         """Return the ring of film under the lid, as thick as the sheet: cut, not printed."""
         high, r = self.z['sheet'], self.r
-        holes = self.at(self.cut(1.5 + self.gap, 0.0, high), self.made.pegs(self.made.lid_angles))
-        return self.disc(r['outer'], 0.0, high) - self.cut(r['sole'], 0.0, high) - holes
+        holes = self.cut(r['sole'], 0.0, high) + self.peg_holes(0.0, high)
+        return self.disc(r['outer'], 0.0, high) - holes
 
     def cap(self) -> Solid:
         """Return plenum, sealing face, hole for the fitting, screws, and holes for the leg."""
         z, r, use = self.z, self.r, self.made.set
-        solid = self.disc(r['flange'], z['stop'], z['cap']) - self.screws(z['stop'], z['cap'])
+        solid = self.disc(r['flange'], z['stop'], z['cap']) - self.screws(
+            'screw', z['stop'], z['cap']
+        )
         if self.large:
             solid -= self.disc(r['gasket'] + 1.0, z['stop'] - _OVER, z['land'])
         solid -= self.disc(r['plenum'], z['stop'] - _OVER, z['roof'])
         solid -= self.cut(0.5 * use['fitting'], z['roof'], z['cap'])
-        if not use['mount_holes'] or self.made.foot.pads == 1:
+        if not use['mount_holes']:
             return solid
         hole = self.disc(0.5 * use['mount_hole'], z['cap'] - 4.5, z['cap'] + _OVER)
         return solid - self.around(hole, 0.5 * use['mount_circle'], int(use['mount_holes']))
@@ -207,7 +208,7 @@ class _Builder:
     def retainer(self) -> Solid:
         """Return the ring under the body's flange, as high as the squeezed flange."""
         r, low, up = self.r, self.z['flange'] - 3.0, self.z['stop']
-        solid = self.disc(r['flange'], low, up) - self.screws(low, up)
+        solid = self.disc(r['flange'], low, up) - self.screws('thread', low, up)
         solid -= self.cut(r['bore'] + self.gap, low, up)
         return solid - self.disc(r['gasket'] + 1.0, self.z['flange'], up + _OVER)
 

@@ -196,8 +196,8 @@ def _stack(axes: Axes, parts: Sequence[Part]) -> None:
         words, middle = part.name + _CAST.get(part.name, ''), (level + 0.5 * (high - low)) * _UP[2]
         axes.text(1.06 * wide, middle, words, va='center')
         level += high - low + 0.42 * wide
-    axes.margins(0.25, 0.02)
     axes.autoscale_view()
+    axes.set_xlim(right=1.7 * axes.get_xlim()[1])
 
 
 def _triangles(solid: Solid, part: Part) -> tuple[Array, Array]:

@@ -27,7 +27,7 @@ PRINTED = ('filament', 'resin')
 HEADS = ('part', 'of', 'size, mm', 'volume, cm³', 'mass, g', 'triangles', 'on the bed')
 _UNTRIED = (
     'No foot was made by these files yet: they were modelled, checked and sliced. Cast the test'
-    ' piece first.'
+    ' piece first: test_piece/making.html.'
 )
 _SILICONE = (
     'silicone',
@@ -48,7 +48,7 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
     made : Plan
         The foot.
     progress : callable
-        Is told how many of five steps are done.
+        Is told how many of three steps are done.
 
     Raises
     ------
@@ -57,23 +57,23 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
     PadError
         When manifold3d is not installed.
     """
-    parts, piece = build(made), test_piece(made)
-    single = build(piece)
-    found = _meshes(made, parts, '') | _meshes(piece, single, 'test_piece/')
-    progress(1)
+    found: dict[str, bytes] = {}
+    texts: dict[str, str] = {}
+    for folder, each in (('', made), ('test_piece/', test_piece(made))):
+        parts = build(each)
+        found |= {folder + name: data for name, data in _meshes(each, parts).items()}
+        with matplotlib.rc_context(STYLE):
+            views = section(exploded(each, parts))
+            texts[f'{folder}making.html'] = _page(each, parts, views)
+        listed = io.StringIO()
+        csv.writer(listed, lineterminator='\n').writerows([HEADS, *rows(parts)])
+        texts[f'{folder}parts.csv'] = listed.getvalue()
+        progress(1 + bool(folder))
+    parts = build(made)
+    texts['as_made.yaml'], texts['measurements.csv'] = as_made(made, parts), measurements(made)
     with matplotlib.rc_context(STYLE):
-        sheet, views = drawing(made, parts), exploded(made, parts)
-        progress(2)
+        sheet = drawing(made, parts)
         found |= {f'drawing.{kind}': rendered(sheet, kind, dpi=150) for kind in ('svg', 'pdf')}
-        progress(4)
-        texts = {
-            'making.html': _page(made, parts, section(views), _weighed(piece, single)),
-            'measurements.csv': measurements(made),
-            'as_made.yaml': as_made(made, parts),
-        }
-    listed = io.StringIO()
-    csv.writer(listed, lineterminator='\n').writerows([HEADS, *rows(parts)])
-    texts['parts.csv'] = listed.getvalue()
     return found | {name: text.encode() for name, text in texts.items()}
 
 
@@ -82,16 +82,18 @@ def test_piece(made: Plan) -> Plan:
     foot, radius = made.foot, made.foot.pad.radius
     sole = max(radius + edge_of(radius) + 2e-3, 6e-3)
     single = replace(foot, pads=1, sole_radius=sole, source=f'{foot.source}, one pad')
-    return plan(single, made.process, made.given)
+    return plan(single, made.process, made.given | {'mount_holes': 0})
 
 
-def _meshes(made: Plan, parts: Mapping[str, Part], folder: str) -> dict[str, bytes]:
-    printed = [part for part in parts.values() if part.made in PRINTED]
-    found = {f'{part.name.replace(" ", "_")}.stl': stl(as_printed(part)) for part in printed}
+def _meshes(made: Plan, parts: Mapping[str, Part]) -> dict[str, bytes]:
+    found: dict[str, bytes] = {}
+    for kind in PRINTED:
+        printed = [part for part in parts.values() if part.made == kind]
+        found |= {f'{part.name.replace(" ", "_")}.stl': stl(as_printed(part)) for part in printed}
+        found[f'{kind}.3mf'] = three_mf(printed)
     holes = [(x, y, 1.5 + made.set['clearance']) for x, y in made.pegs(made.lid_angles)]
     rings = [(0.0, 0.0, made.r['sole']), (0.0, 0.0, made.r['outer'])]
-    found |= {'printed.3mf': three_mf(printed), 'spacer.dxf': dxf([*rings, *holes]).encode()}
-    return {folder + name: data for name, data in found.items()}
+    return found | {'spacer.dxf': dxf([*rings, *holes]).encode()}
 
 
 def rows(parts: Mapping[str, Part]) -> list[list[str]]:
@@ -111,8 +113,9 @@ def measurements(made: Plan) -> str:
     """Return the table to fill at the bench, which ``pad calibrate`` reads."""
     shares = (0.4, 0.55, 0.7, 0.85, 0.95, 0.7, 0.85, 0.95)  # five heights, three limits
     return (
-        f'# One pad of {made.foot.source}. Fill in heights (dial gauge) and force limits\n'
-        '# (scale), delete rows without a value, then:\n'
+        f'# One pad of {made.foot.source}. Heights from the side, by a camera, nothing touching.\n'
+        '# Force limits: a plate on a scale, pressed until its gap to the sole is a sheet thick.\n'
+        '# Fill in or delete each row, then:\n'
         '# pad calibrate measurements.csv --foot as_made.yaml --out my_foot.yaml\n'
         'pressure [kPa], height [mm], force_limit [N]\n'
     ) + ''.join(f'{1e-3 * share * ceiling_of(made):.3g}, ,\n' for share in shares)
@@ -121,7 +124,7 @@ def measurements(made: Plan) -> str:
 # --- the page ------------------------------------------------------------------------------------
 
 
-def _page(made: Plan, parts: Mapping[str, Part], views: str, single: str) -> str:
+def _page(made: Plan, parts: Mapping[str, Part], views: str) -> str:
     escaped = [[html.escape(cell) for cell in row] for row in rows(parts)]
     title = f'Making {made.foot.source}'
     sections = [
@@ -129,7 +132,7 @@ def _page(made: Plan, parts: Mapping[str, Part], views: str, single: str) -> str
         warning(_UNTRIED),
         views,
         '<h2>Parts to print and to cut</h2>' + table(HEADS, escaped, range(3, 6)),
-        f'<h2>Silicone</h2>{_weighed(made, parts)}<p>For the test piece:</p>{single}',
+        f'<h2>Silicone</h2>{_weighed(made, parts)}',
         *_work(made, parts),
         '<h2>What to expect</h2>' + _expectations(made),
     ]
@@ -156,7 +159,13 @@ def _work(made: Plan, parts: Mapping[str, Part]) -> Iterator[str]:
         'sheet_of': made.sheet.name,
         'body': made.body.name,
         'heap': 1e-6 * math.pi * (lined + r['gasket'] ** 2) * weigh[-1].casting['density'],
-        'screws': f'{made.screws} screws M{made.set["screw"]:g}',
+        'screws': f'{made.screws} screws M{made.set["screw"]:g} × {made.screw_length:g}',
+        'hole': 2.0 * r['hole'],
+        'ceiling': 1e-3 * ceiling_of(made),
+        'last': f'Screw the cap to the leg with {made.set["mount_holes"]:g} screws, 4 mm into its'
+        f' holes on ⌀ {made.set["mount_circle"]:.1f}; the hose leaves through the middle.'
+        if made.set['mount_holes']
+        else 'Measure it as ../measurements.csv says, and run pad calibrate.',
     }
     for name, batch in (('sheet', weigh[0]), ('body', weigh[-1])):
         values[f'half_{name}'] = 500.0 * batch.mixed
@@ -190,4 +199,6 @@ def _expectations(made: Plan) -> str:
             f'Only {made.z["bone"]:.1f} mm of silicone are under the bone, to hold the rims of'
             f' the pads; {foot.source} has {1e3 * foot.sole_thickness:g} mm, which land softly.'
         )
+    if doubt := made.sheet.factor_range if foot.pad.material else None:
+        words += f' The material may need {doubt[0]:g} to {doubt[1]:g} times these pressures.'
     return table(head, body, range(6)) + f'<p>{html.escape(words)}</p>'

@@ -212,9 +212,9 @@ def test_the_command_writes_all_files(tmp_path, capsys):
         assert line == '...' or line.replace('large37_moulds', str(folder)) in printed
     written = {str(path.relative_to(folder)) for path in folder.rglob('*.*')}
     assert written >= {
-        *('bone.stl', 'cap.stl', 'inner_mould.stl', 'lid.stl', 'ring.stl', 'printed.3mf'),
+        *('bone.stl', 'cap.stl', 'inner_mould.stl', 'lid.stl', 'ring.stl', 'filament.3mf'),
         *('spacer.dxf', 'drawing.svg', 'drawing.pdf', 'making.html', 'parts.csv'),
-        *('as_made.yaml', 'measurements.csv', 'test_piece/bone.stl', 'test_piece/spacer.dxf'),
+        *('resin.3mf', 'as_made.yaml', 'measurements.csv', 'test_piece/making.html'),
     }
     written = (folder / 'making.html').read_text()
     assert (
