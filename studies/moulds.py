@@ -54,6 +54,7 @@ _EMPTY = 1e-3  # mm³ of overlap that is rounding
 def faults(made: Plan, parts: Mapping[str, Part], voxel: float | None = None) -> list[str]:
     """Return what is wrong with the parts of a foot, in words."""
     found = [f'{part.name} is not closed' for part in parts.values() if not closed(part)]
+    found += [f'{part.name} is not flat on the bed' for part in parts.values() if not lies(part)]
     found += [f'{name}: volume' for name, off in volumes(made, parts) if abs(off) > _OFF]
     found += overlaps(made, parts)
     found += undercuts(parts)
@@ -80,6 +81,12 @@ def closed(part: Part) -> bool:
     return bool(good and len(apart) == 3 and not any(map(int, [*apart, *mended])))
 
 
+def lies(part: Part) -> bool:
+    """Return whether a printed part has half of its outline or more on the bed."""
+    solid = as_printed(part)
+    return part.made not in PRINTED or solid.slice(0.05).area() > 0.5 * solid.project().area()
+
+
 def _cone(low: float, high: float, start: float, end: float) -> float:
     """Return the volume of a cone between heights."""
     return math.pi / 3.0 * (high - low) * (start * start + start * end + end * end)
@@ -88,7 +95,7 @@ def _cone(low: float, high: float, start: float, end: float) -> float:
 def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]]:
     """Yield parts and how far their volumes are off the formulas of circles, as a share."""
     z, r, use, pads = made.z, made.r, made.set, made.foot.pads
-    slope, gap = math.tan(math.radians(use['draft'])), use['clearance']
+    slope, gap, thick = made.slope, use['clearance'], max(4.0, 0.12 * r['outer'])
 
     def disc(radius: float, low: float, high: float) -> float:
         return _cone(low, high, radius, radius)
@@ -103,7 +110,7 @@ def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]
     hollow = disc(r['flange'] + gap, z['flange'] - 0.5 * gap, z['top'])
     hollow = hollow if large else disc(r['gasket'], z['flange'], z['top'])
     formulas = {
-        'lid': disc(r['outer'], -4.0, 0.0) - 3.0 * disc(1.5 + gap, -4.0, 0.0),
+        'lid': disc(r['outer'], 0.0, thick) - 3.0 * disc(1.5 + gap, 0.0, thick),
         'spacer': disc(r['outer'], 0.0, z['sheet'])
         - disc(r['sole'], 0.0, z['sheet'])
         - 3.0 * disc(1.5 + gap, 0.0, z['sheet']),
@@ -169,7 +176,7 @@ def _beside_the_seal(made: Plan, shared: float) -> float:
     """Return what cap and silicone share, mm³, if it is not the squeezed seal, and else 0."""
     z, r = made.z, made.r
     low = z['top'] if made.process == 'large' else z['flange']
-    slope = math.tan(math.radians(made.set['draft']))
+    slope = made.slope
     share = (z['land'] - low) / (z['face'] - low)
     squeezed = _cone(z['land'], z['face'], r['gasket'] - share * slope, r['gasket'] - slope)
     squeezed -= math.pi * r['plenum'] ** 2 * (z['face'] - z['land'])

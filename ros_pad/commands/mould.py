@@ -20,6 +20,7 @@ For example:
 from __future__ import annotations
 
 import argparse
+import csv
 import pathlib
 import textwrap
 
@@ -56,7 +57,6 @@ def run(options: argparse.Namespace) -> int:
     given = {name: typed(text) for name, text in pairs('--set', options.set, '=').items()}
     made = plan(foot, options.process, given)
     folder = options.out or pathlib.Path(f'{pathlib.Path(options.foot).stem}_moulds')
-    from ros_pad.making import build
     from ros_pad.making.expect import ceiling_of
     from ros_pad.reports import moulds
     from ros_pad.reports.files import save
@@ -67,7 +67,8 @@ def run(options: argparse.Namespace) -> int:
         refuse(folder / name, options.force)
     for name, data in found.items():
         save(folder / name, data)
-    print_table(moulds.HEADS, moulds.rows(build(made)), 3)
+    head, *rows = csv.reader(found['parts.csv'].decode().splitlines())
+    print_table(head, rows, 3)
     print(f'\nceiling to set: {ceiling_of(made):.0f} Pa gauge')
     print(f'page to work by: {folder / "making.html"}')
     return 0

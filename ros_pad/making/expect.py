@@ -75,13 +75,13 @@ def ceiling_of(made: Plan) -> float:
 
 
 def batches(made: Plan, parts: Mapping[str, Part]) -> list[Batch]:
-    """Return what to weigh of sheet and body, once if they are one, with waste: a fifth or 5 g."""
+    """Return what to weigh of the silicone, or of sheet and body, with waste: a fifth or 5 g."""
     rows = []
-    for material in dict.fromkeys((made.sheet, made.body)):
-        assert material.casting is not None
-        volume = sum(part.solid.volume() for part in parts.values() if part.made == material.name)
-        mass = 1e-9 * volume * material.casting['density']
-        rows.append(Batch(material, material.casting, mass, max(1.2 * mass, mass + 5e-3)))
+    for name, material in (('silicone', made.sheet), ('sheet', made.sheet), ('body', made.body)):
+        if name in parts:
+            assert material.casting is not None
+            mass = 1e-9 * parts[name].solid.volume() * material.casting['density']
+            rows.append(Batch(material, material.casting, mass, max(1.2 * mass, mass + 5e-3)))
     return rows
 
 

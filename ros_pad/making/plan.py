@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from ros_pad.configuration import Setting, Table, choice
 from ros_pad.contact import Foot, Material
 from ros_pad.contact.layout import LARGE, LINING, RIM, SKIN, WALL, Layout, hexagonal, reach_of
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import InvalidInput, PadError
 
 PROCESSES = ('large', 'small')
 """A printed bone wrapped in silicone (thesis 5.1.1), and a body of silicone under a softer sheet
@@ -25,17 +27,21 @@ STRENGTH = 15.0  # MPa in bending: half of what printed ABS breaks at in its lay
 _POISSON = 0.35  # of ABS
 
 
-def _length(name: str, default: float, description: str, high: float = 0.1) -> Setting:
-    return Setting(name, default, description, 'm', 0.0, high)
+def _length(
+    name: str, default: float, description: str, low: float = 0.0, high: float = 0.1
+) -> Setting:
+    return Setting(name, default, description, 'm', low, high)
 
 
 SETTINGS = (
     _length('tolerance', 0.05e-3, 'How far the thickness of the sheet may be off.'),
-    _length('nozzle', 0.4e-3, 'Nozzle of the filament printer.'),
-    _length('wall', WALL, 'Smallest wall of the filament printer.'),
+    _length('nozzle', 0.4e-3, 'Nozzle of the filament printer.', 1e-4),
+    _length('wall', WALL, 'Smallest wall of the filament printer.', 2e-4),
     _length('hole', 1e-3, 'Smallest hole of the filament printer, in diameter.'),
-    _length('clearance', 0.2e-3, 'Gap of printed parts that fit into one another, on each side.'),
-    _length('bed', 0.145, 'Side of the smaller of the two print beds.', 2.0),
+    _length(
+        'clearance', 0.2e-3, 'Gap of printed parts around one another; half for dowels.', 0.0, 5e-4
+    ),
+    _length('bed', 0.145, 'Side of the smaller of the two print beds.', 0.0, 2.0),
     _length('pin', 0.3e-3, 'Smallest pin of the resin printer, in diameter.'),
     Setting('slenderness', 20.0, 'Largest length of a pin over its diameter.', '', 1.0, 100.0),
     Setting('draft', 0.25, 'Angle by which pins and bores open.', 'degrees', 0.0, 5.0),
@@ -47,10 +53,10 @@ SETTINGS = (
     _length('bone', 0.0, 'Thickness of the bone; 0: as thick as it must be, from 8 mm.'),
     _length('flange', 3e-3, 'Thickness of the flange of the bone.'),
     Setting('load', 0.0, 'Peak load; 0: three times the force limit.', 'N', 0.0, 1e5),
-    _length('screw', 3e-3, 'Diameter of the screws, which cut their thread in bone or retainer.'),
-    _length('fitting', 4.2e-3, 'Hole for the fitting of the hose: to be tapped to M5.'),
+    _length('screw', 3e-3, 'Screws, which cut their thread in bone or retainer.', 2e-3, 1e-2),
+    _length('fitting', 4.2e-3, 'Hole for the fitting of the hose: tapped to M5.', 1e-3),
     Setting('mount_holes', 3, 'Holes in the cap for the leg.', '', 0, 24),
-    _length('mount_hole', 2.5e-3, 'Their diameter: screws of 3 mm cut their thread.'),
+    _length('mount_hole', 2.5e-3, 'Their diameter: screws of 3 mm cut their thread.', 1e-3),
     _length('mount_circle', 0.0, 'Diameter of their circle; 0: 20 mm, or what there is room for.'),
 )
 """Limits of printers, walls, screws and holes, SI."""
@@ -95,8 +101,8 @@ class Plan:
 
     @property
     def screws(self) -> int:
-        """Number of screws between cap and bone or retainer: one every 25 mm, at least six."""
-        return max(6, math.ceil(2.0 * math.pi * self.r['screws'] / 25.0))
+        """Number of screws between cap and bone or retainer: three for 75 mm, at least six."""
+        return max(6, 3 * math.ceil(2.0 * math.pi * self.r['screws'] / 75.0))
 
     @property
     def screw_length(self) -> float:
@@ -111,14 +117,25 @@ class Plan:
         return [(radius * math.cos(a), radius * math.sin(a)) for a in turns]
 
     @property
-    def bulge(self) -> float:
-        """How far the sole without a bone bulges at the ceiling, mm: a clamped plate.
+    def edge(self) -> float:
+        """Room between the outermost pad and the edge of the sole, mm."""
+        use = self.set
+        return use['lining'] + use['wall'] + use['skin'] if self.process == 'large' else use['rim']
 
-        Modulus three times the shear modulus of its material; holes and sheet are left out.
+    @property
+    def slope(self) -> float:
+        """Tangent of the draft."""
+        return math.tan(math.radians(self.set['draft']))
+
+    def bulge(self, thick: float) -> float:
+        """Return how far a sole without a bone bulges at the ceiling, mm: a clamped plate.
+
+        Bending and shear of a plate of this thickness, mm, with ν = 0.5; holes are left out.
         """
-        thick, modulus = self.z['top'] - self.z['sheet'], 3e-6 * self.body.shear_modulus
-        # ν = 0.5: q a⁴/(64 D) with D = E h³/9.
-        return 9e-6 * self.foot.ceiling * self.r['plenum'] ** 4 / (64.0 * modulus * thick**3)
+        load, shear = 1e-6 * self.foot.ceiling, 1e-6 * self.body.shear_modulus
+        wide = self.r['bore'] + self.slope * (thick - self.z['top'] + self.z['sheet'])
+        bending = 3.0 * load * wide**4 / (64.0 * shear * thick**3)
+        return bending + 0.3 * load * wide**2 / (shear * thick)
 
 
 def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None = None) -> Plan:
@@ -148,13 +165,11 @@ def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None
     table.finish()
     use = {each.name: values[each.name] * (1e3 if each.unit == 'm' else 1.0) for each in SETTINGS}
     sheet, body = _silicones(foot, process)
-    large = process == 'large'
-    edge = use['lining'] + use['wall'] + use['skin'] if large else use['rim']
-    layout = Layout.of(foot.pads, foot.pad.radius, foot.sole_radius, 1e-3 * edge)
-    places, pitch = 1e3 * layout.places, 1e3 * layout.pitch
-    made = Plan(foot, process, dict(given or {}), use, places, pitch, {}, {}, sheet, body)
+    made = Plan(foot, process, dict(given or {}), use, np.zeros((1, 2)), 0.0, {}, {}, sheet, body)
+    layout = Layout.of(foot.pads, foot.pad.radius, foot.sole_radius, 1e-3 * made.edge)
+    made = replace(made, places=1e3 * layout.places, pitch=1e3 * layout.pitch)
     title = f'{foot.source} cannot be made ({process} process)'
-    least = _least(made, edge)
+    least = _least(made)
     if 1e3 * foot.sole_radius < least:
         raise InvalidInput(
             f'{title}: {foot.pads} pads of radius {1e3 * foot.pad.radius:g} mm on a sole of radius'
@@ -162,14 +177,20 @@ def plan(foot: Foot, process: str | None = None, given: Mapping[str, Any] | None
             f' sole_radius of at least {0.1 * math.ceil(10.0 * least - 1e-9):.1f} mm is needed, or'
             ' fewer pads'
         )
-    if large:
+    if process == 'large':
         use['bone'] = use['bone'] or max(8.0, 0.5 * math.ceil(2.0 * bone_needed(made)))
     made.z.update(_heights(made))
-    made.r.update(_radii(made, reach_of(places)))
+    made.r.update(_radii(made, reach_of(made.places)))
+    roof = _plate(foot.ceiling, made.r['plenum'], 1.0)
+    made.z['cap'] = made.z['roof'] + max(6.0, 0.5 * math.ceil(2.0 * roof))
     use['mount_circle'] = use['mount_circle'] or min(20.0, _mounts(made)[1])
     wrong = [
-        f'{name} is {value:.3g} mm, {"at least" if value < low else "at most"}'
-        f' {low if value < low else high:.3g} mm is needed'
+        f'{name} is {value:.3g} mm, '
+        + (
+            f'at least {0.01 * math.ceil(100.0 * low - 1e-6):.2f} mm is needed'
+            if value < low
+            else f'at most {0.01 * math.floor(100.0 * high + 1e-6):.2f} mm is allowed'
+        )
         for name, value, low, high in _limits(made)
         if not low - 1e-9 <= value <= high + 1e-9
     ]
@@ -182,7 +203,7 @@ def verdict(foot: Foot) -> str:
     """Return whether a foot can be made, and if not why not, as a sentence."""
     try:
         made = plan(foot)
-    except InvalidInput as error:
+    except PadError as error:
         return f'Not to be cast: {error}.'
     return (
         f'It can be cast ({made.process} process, {made.pitch:.2f} mm from pad to pad): pad mould.'
@@ -215,18 +236,16 @@ def _heights(made: Plan) -> dict[str, float]:
     else:
         top = 1e3 * made.foot.sole_thickness
         z = {'flange': top - 2.0, 'top': top, 'face': top, 'stop': top - 0.4, 'land': top - 0.4}
-    roof = z['face'] + 2.0
-    return {'sheet': sheet, **z, 'roof': roof, 'cap': roof + 6.0}
+    return {'sheet': sheet, **z, 'roof': z['face'] + 2.0}
 
 
 def _radii(made: Plan, reach: float) -> dict[str, float]:
     use, z, large = made.set, made.z, made.process == 'large'
     pad, sole = 1e3 * made.foot.pad.radius, 1e3 * made.foot.sole_radius
-    slope = math.tan(math.radians(use['draft']))
-    root = pad + slope * (z['face'] - z['sheet'])
-    bore = sole + slope * (z['flange'] - z['sheet'])
-    plenum = reach + root + (1.0 if large else 0.5)
-    gasket = plenum + 2.0 if large else bore + 3.0
+    root = pad + made.slope * (z['face'] - z['sheet'])
+    bore = sole + made.slope * (z['flange'] - z['sheet'])
+    plenum = reach + root + 1.0 if large else bore
+    gasket = max(plenum + 2.0, bore) if large else bore + 3.0
     hole = 0.5 * use['screw'] + 0.2
     screws = gasket + 1.0 + use['wall'] + hole
     flange = screws + hole + 2.0
@@ -236,29 +255,27 @@ def _radii(made: Plan, reach: float) -> dict[str, float]:
     return r | {'flange': flange, 'outer': flange + use['clearance'] + 6.0}
 
 
-def _least(made: Plan, edge: float) -> float:
+def _least(made: Plan) -> float:
     """Return the least radius of the sole, mm, for walls between the pads and at the edge."""
     use, radius = made.set, 1e3 * made.foot.pad.radius
     if made.process == 'large':
         cell = 2.0 * (radius + use['lining']) + use['wall']
     else:
-        slope = math.tan(math.radians(use['draft']))
         long = 1e3 * (made.foot.sole_thickness - (made.foot.pad.thickness or 0.0))
-        cell = 2.0 * (radius + slope * long) + use['web']
+        cell = 2.0 * (radius + made.slope * max(long, 0.0)) + use['web']
     shape = hexagonal(made.foot.pads)
-    return cell * reach_of(shape - shape.mean(axis=0)) + radius + edge
+    return cell * reach_of(shape - shape.mean(axis=0)) + radius + made.edge
 
 
 def _limits(made: Plan) -> Iterator[tuple[str, float, float, float]]:
     """Yield lengths, mm, with their least and largest allowed value."""
     use, z, r = made.set, made.z, made.r
     least_pin = max(use['pin'], (z['face'] - z['sheet']) / use['slenderness'])
-    roof = _plate(made.foot.ceiling, r['plenum'], 1.0)
     yield 'the sheet, for its tolerance,', z['sheet'], 2.0 * use['tolerance'], 0.9 * r['pad']
     yield 'a pad, as a pin of resin, in diameter,', 2.0 * r['pad'], least_pin, math.inf
     yield 'wall', use['wall'], 2.0 * use['nozzle'], math.inf
     yield 'the largest part', 2.0 * r['outer'], 0.0, use['bed']
-    yield 'the roof of the cap', z['cap'] - z['roof'], roof, math.inf
+    yield 'fitting', use['fitting'], 0.0, 2.0 * (r['gasket'] - use['wall'])
     if made.process == 'large':
         lining, bone = use['lining'] - r['root'] + r['pad'], use['flange'] + 2.0
         yield 'lining, at the root of a pin,', lining, use['web'], math.inf
@@ -266,11 +283,12 @@ def _limits(made: Plan) -> Iterator[tuple[str, float, float, float]]:
         yield 'under', use['under'], use['web'], math.inf
         yield 'a hole of the bone, in diameter,', 2.0 * r['hole'], use['hole'], math.inf
         yield 'bone', use['bone'], max(bone_needed(made), bone), math.inf
-        yield 'flange', use['flange'], flange_needed(made), math.inf
+        yield 'flange', use['flange'], max(flange_needed(made), 1.0), math.inf
     else:
-        # As a plate its bulge falls with the cube of its thickness: at most a pad's radius.
-        body = (z['top'] - z['sheet']) * (made.bulge / r['pad']) ** (1.0 / 3.0)
-        yield 'sole_thickness', z['top'], z['sheet'] + max(3.0, body), math.inf
+        # The retainer is 1.5 mm above the floor or more, and the bulge is at most a pad's radius.
+        thick = (each for each in np.arange(3.0, 300.0, 0.1) if made.bulge(each) <= r['pad'])
+        least = max(6.5, z['sheet'] + next(thick, 300.0))
+        yield 'sole_thickness', z['top'], least, math.inf
         yield 'rim', use['rim'], 0.8, math.inf
     if use['mount_holes']:
         yield 'mount_circle', use['mount_circle'], *_mounts(made)
@@ -280,8 +298,10 @@ def _mounts(made: Plan) -> tuple[float, float]:
     """Return the least and the largest circle of the holes for the leg, mm in diameter."""
     use, r = made.set, made.r
     walls = use['mount_hole'] + 2.0 * use['wall']
-    # The fitting is 4 mm wider than its hole.
-    return use['fitting'] + 4.0 + walls, 2.0 * (r['screws'] - r['screw']) - walls
+    # The fitting is 4 mm wider than its hole, and there is a wall between two holes.
+    apart = math.sin(math.pi / max(use['mount_holes'], 2.0))
+    least = max(use['fitting'] + 4.0 + walls, (walls - use['wall']) / apart)
+    return least, 2.0 * (r['screws'] - r['screw']) - walls
 
 
 def _plate(pressure: float, radius: float, solid: float) -> float:

@@ -17,7 +17,7 @@ Solid: TypeAlias = Any
 """A `manifold3d.Manifold`, which has no types."""
 
 _OVER = 0.5  # mm by which a cut goes beyond what it cuts
-_LID, _PLATE, _VENT = 4.0, 5.0, 0.3  # mm
+_PLATE, _VENT = 5.0, 0.3  # mm
 
 
 class Part(NamedTuple):
@@ -58,7 +58,11 @@ def build(made: Plan) -> dict[str, Part]:
         import manifold3d
     except ImportError as error:
         raise PadError(f"manifold3d is missing ({error}): pip install 'ros_pad[make]'") from error
-    return _Builder(made, manifold3d.Manifold).parts()
+    parts = _Builder(made, manifold3d.Manifold).parts()
+    for part in parts.values():
+        if part.solid.is_empty() or part.solid.status() != manifold3d.Error.NoError:
+            raise PadError(f'{made.foot.source}: {part.name} has no volume with these settings')
+    return parts
 
 
 class _Builder:
@@ -67,7 +71,7 @@ class _Builder:
     def __init__(self, made: Plan, kind: Any) -> None:
         self.made, self.kind = made, kind
         self.z, self.r, self.gap = made.z, made.r, made.set['clearance']
-        self.slope = math.tan(math.radians(made.set['draft']))
+        self.slope = made.slope
         self.large = made.process == 'large'
 
     def disc(self, radius: float, low: float, high: float, top: float | None = None) -> Solid:
@@ -84,9 +88,9 @@ class _Builder:
         """Return copies of a solid at places that do not overlap."""
         return self.kind.compose([solid.translate((*place, 0.0)) for place in places])
 
-    def around(self, solid: Solid, radius: float, count: int, step: int = 1) -> Solid:
+    def around(self, solid: Solid, radius: float, count: int) -> Solid:
         """Return copies of a solid in equal steps on a circle."""
-        turns = [2.0 * math.pi * k / count for k in range(0, count, step)]
+        turns = [2.0 * math.pi * k / count for k in range(count)]
         return self.at(solid, [(radius * math.cos(a), radius * math.sin(a)) for a in turns])
 
     def screws(self, name: str, low: float, high: float) -> Solid:
@@ -145,14 +149,13 @@ class _Builder:
         return {each.name: each for each in [*found, Part('air', air, 'air')]}
 
     def inner(self) -> Solid:
-        """Return the plate with the pins; dowels hold bone (by its screw holes) and ring."""
+        """Return the plate with pins; dowels hold the bone by its screw holes, pegs the ring."""
         z, r = self.z, self.r
         plate = self.disc(r['outer'], z['top'], z['face'] + _PLATE)
         if self.large:
             dowel = self.disc(r['thread'] - 0.5 * self.gap, z['flange'] + 0.5, z['face'] + 1.0)
-            step = self.made.screws // 3
             plate -= self.seal(_OVER)
-            plate += self.around(dowel, r['screws'], self.made.screws, step)
+            plate += self.around(dowel, r['screws'], 3)
         peg = self.disc(1.5, z['top'] - 3.0, z['top'] + 1.0)
         return plate + self.pins(_OVER) + self.at(peg, self.made.pegs(self.made.plate_angles))
 
@@ -177,7 +180,8 @@ class _Builder:
 
     def lid(self) -> Solid:
         """Return the flat plate that closes the mould on the floor's side."""
-        return self.disc(self.r['outer'], -_LID, 0.0) - self.peg_holes(-_LID, 0.0)
+        thick = max(4.0, 0.12 * self.r['outer'])
+        return self.disc(self.r['outer'], -thick, 0.0) - self.peg_holes(-thick, 0.0)
 
     def peg_holes(self, low: float, high: float) -> Solid:
         """Return the holes for the loose pegs of lid, spacer and ring: their faces stay flat."""
@@ -199,7 +203,7 @@ class _Builder:
         if self.large:
             solid -= self.disc(r['gasket'] + 1.0, z['stop'] - _OVER, z['land'])
         solid -= self.disc(r['plenum'], z['stop'] - _OVER, z['roof'])
-        solid -= self.cut(0.5 * use['fitting'], z['roof'], z['cap'])
+        solid -= self.disc(0.5 * use['fitting'], z['roof'] - 1e-3, z['cap'] + _OVER)
         if not use['mount_holes']:
             return solid
         hole = self.disc(0.5 * use['mount_hole'], z['cap'] - 4.5, z['cap'] + _OVER)

@@ -265,7 +265,8 @@ class Page:
             )
         else:
             self._ui.download.content(data, 'my_foot_moulds.zip')
-        self._status.set_text('')
+        finally:
+            self._status.set_text('')
 
 
 def _si(field: Field, number: float | None) -> float | None:

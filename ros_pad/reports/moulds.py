@@ -13,7 +13,6 @@ from dataclasses import replace
 import matplotlib
 
 from ros_pad.configuration import shared_folder
-from ros_pad.contact.layout import edge_of
 from ros_pad.making import Part, Plan, build, plan
 from ros_pad.making.expect import DENSITY, as_made, batches, ceiling_of, expected
 from ros_pad.making.files import dxf, stl, three_mf
@@ -80,9 +79,10 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
 def test_piece(made: Plan) -> Plan:
     """Return one pad, cast in the same process, for the bench."""
     foot, radius = made.foot, made.foot.pad.radius
-    sole = max(radius + edge_of(radius) + 2e-3, 6e-3)
+    sole = max(radius + 1e-3 * made.edge + 2e-3, 6e-3)
     single = replace(foot, pads=1, sole_radius=sole, source=f'{foot.source}, one pad')
-    return plan(single, made.process, made.given | {'mount_holes': 0})
+    given = made.given | {'mount_holes': 0, 'load': made.given.get('load', 0.0) / foot.pads}
+    return plan(single, made.process, given)
 
 
 def _meshes(made: Plan, parts: Mapping[str, Part]) -> dict[str, bytes]:
@@ -184,7 +184,8 @@ def _work(made: Plan, parts: Mapping[str, Part]) -> Iterator[str]:
 def _expectations(made: Plan) -> str:
     foot, disc = made.foot, math.pi * made.r['sole'] ** 2 * made.z['sheet']
     head, *body = expected(made)
-    mass = 1e-6 * batches(made, {})[0].casting['density'] * disc
+    assert made.sheet.casting is not None
+    mass = 1e-6 * made.sheet.casting['density'] * disc
     words = (
         f'By the model of the foot, for a sheet that is {made.set["tolerance"]:g} mm off. All pads'
         ' share one plenum: the thinnest takes all the air once it balloons. The ceiling that'
@@ -193,7 +194,8 @@ def _expectations(made: Plan) -> str:
         f' 0.01 g of that are {1.0 / mass:.1f} %. '
     )
     if made.process == 'small':
-        words += f'As a plate, the sole bulges by {made.bulge:.2g} mm at the ceiling.'
+        bulge = made.bulge(made.z['top'] - made.z['sheet'])
+        words += f'As a plate, the sole bulges by {bulge:.2g} mm at the ceiling.'
     else:
         words += (
             f'Only {made.z["bone"]:.1f} mm of silicone are under the bone, to hold the rims of'

@@ -141,7 +141,8 @@ def _feet() -> tuple[Claim, ...]:
     carried = small.pads * float(force_limit(small.pad, small.ceiling, small.limit))
     robot = 2.09 * 9.81 / 3.0
     body, bone = plan(small), plan(Foot.load('large37'))
-    bulges = [body.bulge * p / small.ceiling for p in WALKED]
+    bulge = body.bulge(body.z['top'] - body.z['sheet'])
+    bulges = [bulge * p / small.ceiling for p in WALKED]
     return (
         _balloons('large', 1.5e-3, 0.4e-3, '5.1.1'),
         _balloons('small', 0.5e-3, 0.2e-3, '5.1.2'),
