@@ -158,16 +158,25 @@ def volumes(made: Plan, parts: Mapping[str, Part]) -> Iterator[tuple[str, float]
         yield name, parts[name].solid.volume() / volume - 1.0
 
 
+def overlap(one: Solid, other: Solid) -> float:
+    """Return the volume that two solids share, mm³.
+
+    By intersection and by union: where faces coincide, one of them may invent a prism.
+    """
+    shared = (one ^ other).volume(), one.volume() + other.volume() - (one + other).volume()
+    return min(shared) if min(shared) > _EMPTY else 0.0
+
+
 def overlaps(made: Plan, parts: Mapping[str, Part]) -> list[str]:
     """Return pairs that overlap in the mould or in the foot, but for the seal that is squeezed."""
     found = []
     for group in (moulded(parts), assembled(parts)):
         for index, one in enumerate(group):
             for other in group[index + 1 :]:
-                shared = (one.solid ^ other.solid).volume()
+                shared = overlap(one.solid, other.solid)
                 if other.name == 'cap' and one.name in ('silicone', 'body'):
                     shared = _beside_the_seal(made, shared)
-                if abs(shared) > _EMPTY:
+                if shared:
                     found.append(f'{one.name} and {other.name} overlap by {shared:.3g} mm³')
     return found
 
@@ -195,7 +204,7 @@ def undercuts(parts: Mapping[str, Part]) -> list[str]:
         )
         for step in np.geomspace(1e-2, 30.0, 11):
             moved = part.solid.translate((0.0, 0.0, part.leaves * float(step)))
-            if sum((moved ^ each).volume() for each in stays) > _EMPTY:
+            if any(overlap(moved, each) for each in stays):
                 found.append(f'{name} meets what it comes off after {step:.2g} mm')
                 break
     return found

@@ -135,7 +135,8 @@ class _Builder:
         if self.large:
             bone = self.bone()
             cast += self.disc(r['plenum'], z['bone'], z['top'] + _OVER)
-            cast = cast - bone + self.disc(r['sole'], 0.0, z['sheet'] + 1e-3) - self.pins(_OVER)
+            cast += self.disc(r['sole'], 0.0, z['sheet'] + 1e-3)
+            cast -= bone + self.pins(_OVER)
             found += [Part('bone', bone, 'filament', 0, True, 'flange down')]
             found += [Part('silicone', cast, sheet)]
         else:
