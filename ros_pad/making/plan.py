@@ -288,10 +288,10 @@ def _limits(made: Plan) -> Iterator[tuple[str, float, float, float]]:
         # The retainer is 1.5 mm above the floor or more, and the bulge is at most a pad's radius.
         thick = (each for each in np.arange(3.0, 300.0, 0.1) if made.bulge(each) <= r['pad'])
         least = max(6.5, z['sheet'] + next(thick, 300.0))
-        yield 'sole_thickness', z['top'], least, math.inf
+        yield 'sole_thickness (a bone needs less)', z['top'], least, math.inf
         yield 'rim', use['rim'], 0.8, math.inf
     if use['mount_holes']:
-        yield 'mount_circle', use['mount_circle'], *_mounts(made)
+        yield 'mount_circle, unless mount_holes = 0,', use['mount_circle'], *_mounts(made)
 
 
 def _mounts(made: Plan) -> tuple[float, float]:

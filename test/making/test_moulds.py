@@ -118,7 +118,11 @@ def own(**changes):
         (own(), {'bone': 5.5e-3, 'load': 2e3}, r'bone is 5\.5 mm, at least'),
         (own(), {'flange': 1e-3}, r'flange is 1 mm, at least 1\.'),
         (own(), {'bed': 0.05}, 'the largest part is 62'),
-        (own(), {'mount_circle': 60e-3}, 'mount_circle is 60 mm, at most'),
+        (
+            own(),
+            {'mount_circle': 60e-3},
+            'mount_circle, unless mount_holes = 0, is 60 mm, at most',
+        ),
         (own(silicones=()), {}, 'silicones of sheet are needed'),
         (dataclasses.replace(Foot.load('small217'), silicones=()), {}, 'sheet and body'),
         (dataclasses.replace(Foot.load('small217'), sole_thickness=1e-3), {}, 'sole_thickness'),
