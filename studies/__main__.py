@@ -27,7 +27,7 @@ STUDIES = {
     'assumptions': ('closed_loop.assumptions', 'assumed numbers wrong by a factor of 2 (1 h)'),
     'policies': ('closed_loop.policies', 'policies beside rivals on held-out floors (35 min)'),
     'landing': ('closed_loop.landing', 'feet that land more slowly, where it could pay (15 min)'),
-    'moulds': ('moulds', 'moulds of shipped and random feet, judged (5 min)'),
+    'moulds': ('moulds', 'moulds of shipped and random feet, judged (11 min)'),
     'force_limits': ('closed_loop.force_limits', 'force limits of pads by each criterion (10 s)'),
     'fidelity': (
         'closed_loop.fidelity',

@@ -134,7 +134,7 @@ class Foot:
         Thickness of the silicone of the sole, which gives under load, m.
     silicones : tuple of str
         Names or paths of the materials of which the foot is cast: the sheet, then the body if that
-        is another. No number here rests on them; :mod:`ros_pad.making` casts with them.
+        is another. No number here rests on them; ``pad mould`` casts with them.
 
     Raises
     ------
