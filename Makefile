@@ -126,7 +126,7 @@ endef
 # A stamp holds the path of its checkout: a .venv that was moved or lost its Python is redone.
 STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python || echo FORCE)
 
-.venv/ros.stamp: EXTRAS := ros,mujoco,plot
+.venv/ros.stamp: EXTRAS := ros,mujoco,plot,make
 .venv/test.stamp: EXTRAS := ros,test
 .venv/ros.stamp .venv/test.stamp: setup.py setup.cfg $(STALE)
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || { $(MAKE_VENV); }
