@@ -74,10 +74,10 @@ def closed(part: Part) -> bool:
     with tempfile.NamedTemporaryFile(suffix='.stl') as file:
         file.write(data)
         file.flush()
-        told = subprocess.run(['admesh', file.name], capture_output=True, text=True).stdout
+        output = subprocess.run(['admesh', file.name], capture_output=True, text=True).stdout
     # Of facets: before and after its repair; edges fixed, removed, added, reversed.
-    apart = re.findall(r'disconnected edges? *: +(\d+)', told)
-    mended = re.findall(r'(?:Edges fixed|Facets (?:re|ad)\w+|Backwards edges) *: *(\d+)', told)
+    apart = re.findall(r'disconnected edges? *: +(\d+)', output)
+    mended = re.findall(r'(?:Edges fixed|Facets (?:re|ad)\w+|Backwards edges) *: *(\d+)', output)
     return bool(good and len(apart) == 3 and not any(map(int, [*apart, *mended])))
 
 
@@ -335,15 +335,15 @@ def sliced(part: Part) -> dict[str, str]:
         if done.returncode or not out.exists():
             return {'layers': 'error', 'time': done.stderr.strip() or done.stdout.strip()}
         text = zipfile.ZipFile(out).read('config.ini').decode() if resin else out.read_text()
-    told = dict(re.findall(r'^;? ?(\w[^=\n]*?) = (.*)$', text, re.MULTILINE))
+    output = dict(re.findall(r'^;? ?(\w[^=\n]*?) = (.*)$', text, re.MULTILINE))
     if resin:
-        minutes, grams = float(told['printTime']) / 60.0, 1.15 * float(told['usedMaterial'])
-        layers = str(int(told['numFast']) + int(told['numSlow']))
+        minutes, grams = float(output['printTime']) / 60.0, 1.15 * float(output['usedMaterial'])
+        layers = str(int(output['numFast']) + int(output['numSlow']))
         return {'layers': layers, 'time': f'{minutes:.0f} min', 'grams': f'{grams:.1f}'}
     return {
         'layers': str(text.count(';LAYER_CHANGE')),
-        'time': told['estimated printing time (normal mode)'],
-        'grams': told['filament used [g]'],
+        'time': output['estimated printing time (normal mode)'],
+        'grams': output['filament used [g]'],
     }
 
 
@@ -411,5 +411,5 @@ def _row(made: Plan, part: Part) -> dict[str, Any]:
         'cm3': round(1e-3 * part.solid.volume(), 3),
         'closed': closed(part),
     }
-    told = sliced(part) if part.made in PRINTED and shutil.which('prusa-slicer') else {}
-    return row | {'layers': '', 'time': '', 'grams': ''} | told
+    output = sliced(part) if part.made in PRINTED and shutil.which('prusa-slicer') else {}
+    return row | {'layers': '', 'time': '', 'grams': ''} | output

@@ -47,7 +47,7 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
     made : Plan
         The foot.
     progress : callable
-        Is told how many of three steps are done.
+        Takes how many of three steps are done.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
     """
     found: dict[str, bytes] = {}
     texts: dict[str, str] = {}
-    for folder, each in (('', made), ('test_piece/', test_piece(made))):
+    for folder, each in (('test_piece/', test_piece(made)), ('', made)):
         parts = build(each)
         found |= {folder + name: data for name, data in _meshes(each, parts).items()}
         with matplotlib.rc_context(STYLE):
@@ -67,8 +67,7 @@ def files(made: Plan, progress: Progress = lambda _: None) -> dict[str, bytes]:
         listed = io.StringIO()
         csv.writer(listed, lineterminator='\n').writerows([HEADS, *rows(parts)])
         texts[f'{folder}parts.csv'] = listed.getvalue()
-        progress(1 + bool(folder))
-    parts = build(made)
+        progress(2 - bool(folder))
     texts['as_made.yaml'], texts['measurements.csv'] = as_made(made, parts), measurements(made)
     with matplotlib.rc_context(STYLE):
         sheet = drawing(made, parts)
