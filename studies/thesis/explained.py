@@ -21,13 +21,15 @@ from ros_pad.reports.style import Drawn
 
 MINIMAL = 0.10  # relative difference up to which one counts as "minimal"; not from the thesis
 
-REPRODUCED = 'reproduced'
+AGREES = 'agrees'
 SAME = 'same formula'
-REFUTED = 'refuted'
-TUNED = 'tuned to agree'
+TUNED = 'agrees, tuned'
+MISPRINT = 'misprint'
+WRONG = 'error in a derivation'
+DISAGREES = 'our model disagrees'
 OPEN = 'underdetermined'
 NOT_MODELLED = 'not modelled'
-VERDICTS = (REPRODUCED, SAME, REFUTED, TUNED, OPEN, NOT_MODELLED)
+VERDICTS = (AGREES, SAME, TUNED, MISPRINT, WRONG, DISAGREES, OPEN, NOT_MODELLED)
 
 _WORDS = yaml.safe_load((pathlib.Path(__file__).parent / 'words.yaml').read_text('utf-8'))
 
@@ -50,8 +52,11 @@ class Claim:
         Section of the thesis, and equation.
     printed : str
         Number of the thesis.
-    rule : str
-        What counts as agreement, and the condition under which it holds.
+    why : str
+        Line of thought of the verdict: what counts as agreement, or who says otherwise.
+    fails : str
+        Verdict where the statement does not hold, and anyone can check that: :data:`MISPRINT` or
+        :data:`WRONG`. Without it our model disagrees.
     tuned : str
         Assumed numbers that were chosen such that the statement holds.
     missing : str
@@ -59,7 +64,7 @@ class Claim:
     see : str
         Derivation: a page of docs with its anchor.
     same : bool
-        Whether the number of the thesis comes from the formula that it is compared with.
+        Whether its number comes from the formula or the text that it is compared with.
     """
 
     figure: int
@@ -69,7 +74,8 @@ class Claim:
     holds: bool | None
     section: str
     printed: str = ''
-    rule: str = ''
+    why: str = ''
+    fails: str = DISAGREES
     tuned: str = ''
     missing: str = ''
     see: str = ''
@@ -81,8 +87,8 @@ class Claim:
         if self.holds is None:
             return OPEN if self.missing else NOT_MODELLED
         if not self.holds:
-            return REFUTED
-        return TUNED if self.tuned else SAME if self.same else REPRODUCED
+            return self.fails
+        return TUNED if self.tuned else SAME if self.same else AGREES
 
     @property
     def where(self) -> str:
@@ -90,10 +96,10 @@ class Claim:
         return f'{self.section}, Fig. {self.figure}' if self.figure else self.section
 
     def reason(self) -> str:
-        """Return rule and condition, what was tuned if it holds, or what is missing."""
+        """Return the line of thought, what was tuned if it holds, or what is missing."""
         tuned = f'Tuned: {self.tuned}.' if self.verdict == TUNED else ''
         missing = f'Missing: {self.missing}.' if self.verdict == OPEN else ''
-        return ' '.join(filter(None, (self.rule, tuned, missing)))
+        return ' '.join(filter(None, (self.why, tuned, missing)))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the statement for JSON."""
@@ -140,7 +146,7 @@ def claim(key: str, numbers: Any, holds: Any, /, **values: Any) -> Claim:
 def counted(claims: Sequence[Claim]) -> str:
     """Return as text how many statements have each verdict."""
     found = Counter(each.verdict for each in claims)
-    return ', '.join(f'{found[verdict]} {verdict}' for verdict in VERDICTS if found[verdict])
+    return '; '.join(f'{verdict}: {found[verdict]}' for verdict in VERDICTS if found[verdict])
 
 
 @dataclass(frozen=True)

@@ -289,8 +289,8 @@ def _claims(
 
 
 def _sign_claim(setup: Any, rows: Sequence[Row], shape: str, floor: str) -> Claim:
-    """Return the verdict on the sign: decided where an interval is on one side of 0."""
-    parts, lows, highs = [], [], []
+    """Return what is left of wet less dry force, with and without what liquid may add."""
+    parts, ends = [], []
     for kind in _kinds(shape):
         mine = [row for row in rows if row.condition == f'{shape}, {floor}, {kind}']
         here, low, high = (
@@ -299,12 +299,9 @@ def _sign_claim(setup: Any, rows: Sequence[Row], shape: str, floor: str) -> Clai
         )
         shares = [f'{100 * row.modelled:.0f}' for row in mine if not row.unit]
         parts.append(f'{kind} {_few(here)} mN, above 0 in {" and ".join(shares)} % of draws')
-        if kind != NONE:
-            lows += low
-            highs += high
-    holds = True if min(lows) > 0.0 else False if max(highs) < 0.0 else None
+        ends += [*low, *high] if kind != NONE else []
     return claim(
-        'f cap f wet', (*lows, *highs), holds, shape=shape, floor=floor,
+        'f cap f wet', ends, None, shape=shape, floor=floor,
         loads=(setup.lowest_load, setup.highest_load), parts='; '.join(parts),
         samples=setup.samples,
     )  # fmt: skip

@@ -191,7 +191,7 @@ def _statements(claims: Sequence[Claim]) -> str:
         ]
         for claim in claims
     ]
-    return table(['', '', 'the thesis states', 'its number', 'here', 'rule'], rows, range(0))
+    return table(['', '', 'the thesis states', 'its number', 'here', 'why'], rows, range(0))
 
 
 def cells(row: Row) -> list[str]:

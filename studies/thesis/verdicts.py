@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write all statements of the thesis with their verdicts: JSON, and a table of the docs."""
+"""Write all statements of the thesis with their verdicts: JSON, and the tables of the docs."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ros_pad.reports.files import save
@@ -13,9 +13,11 @@ from studies.thesis import walks
 from studies.thesis.explained import Claim, Explained, counted
 from studies.thesis.tangential import DRAWS
 
-PAGE = command.ROOT / 'docs' / 'thesis.md'
+PAGES = {'3': command.ROOT / 'docs' / 'thesis.md', '4, 5': command.ROOT / 'docs' / 'thesis_4_5.md'}
+"""Pages of docs by the chapters whose statements they have."""
+
 MARK = '<!-- below: python -m studies thesis --table -->\n'
-_HEAD = ('where', 'the thesis states', 'verdict')
+_HEAD = ('where', 'the thesis states', 'verdict', 'why')
 
 
 def document(figures: Sequence[Explained], text: Sequence[Claim]) -> dict[str, Any]:
@@ -36,23 +38,23 @@ def _order(claim: Claim) -> tuple[list[int], int]:
     return [int(part) for part in sections[0].split('.')], claim.figure
 
 
-def markdown(kept: Mapping[str, Any]) -> str:
-    """Return the table as Markdown."""
-    rows = [
-        (
-            claim['where'],
-            claim['thesis'] + (f' ({claim["printed"]})' if claim['printed'] else ''),
-            f'[{claim["verdict"]}]({claim["see"]})' if claim['see'] else claim['verdict'],
-        )
-        for claim in kept['claims']
-    ]
-    lines = [_HEAD, ('---',) * len(_HEAD), *rows]
-    table = ''.join(f'| {" | ".join(line)} |\n' for line in lines)
-    return f'{kept["statements"]} statements: {kept["counts"]}.\n\n{table}'
+def tables(kept: Mapping[str, Any]) -> Iterator[tuple[Any, str]]:
+    """Return each page of docs with what stands on it below :data:`MARK`, as Markdown."""
+    lines: dict[Any, list[tuple[str, ...]]] = {page: [] for page in PAGES.values()}
+    for claim in kept['claims']:
+        chapter = re.findall(r'\d', claim['where'])[0]
+        verdict = f'[{claim["verdict"]}]({claim["see"]})' if claim['see'] else claim['verdict']
+        stated = claim['thesis'] + (f' ({claim["printed"]})' if claim['printed'] else '')
+        row = (claim['where'], stated, verdict, claim['why'])
+        lines[PAGES['3' if chapter == '3' else '4, 5']].append(row)
+    for page, rows in lines.items():
+        table = ''.join(f'| {" | ".join(row)} |\n' for row in (_HEAD, ('---',) * 4, *rows))
+        yield page, f'Of all {kept["statements"]} statements {kept["counts"]}.\n\n{table}'
 
 
 def write(kept: Mapping[str, Any]) -> None:
-    """Write docs/charts/thesis.json, and the table below the mark of docs/thesis.md."""
+    """Write docs/charts/thesis.json, and what stands below the mark of the pages."""
     command.write(command.CHARTS, 'thesis', kept)
-    head = PAGE.read_text(encoding='utf-8').partition(MARK)[0]
-    save(PAGE, f'{head}{MARK}\n{markdown(kept)}'.encode())
+    for page, table in tables(kept):
+        head = page.read_text(encoding='utf-8').partition(MARK)[0]
+        save(page, f'{head}{MARK}\n{table}'.encode())

@@ -132,7 +132,7 @@ def test_estimates_of_the_thesis():
 
 def test_verdicts():
     signs = [claim.holds for claim in TRIAL.claims if 'F_cap' in claim.thesis]
-    assert signs == [False, False, None, None]  # flat smooth, flat rough, dome smooth, dome rough
+    assert signs == [None] * 4  # flat smooth, flat rough, dome smooth, dome rough
     assert max(TRIAL.claims[-1].numbers) < 0.2  # of the title
     assert [c.printed for c in TRIAL.claims if 'estimated' in c.thesis] == ['15 to 25 %']
 
@@ -143,4 +143,4 @@ def test_a_film_that_rubs_enough_settles_the_sign():
     trial = bench.run(dataclasses.replace(SCENE, foot=foot).changed(samples=50))
     shares = trial.pick('share of draws above 0', condition='flat, smooth')
     assert [row.modelled for row in shares] == [1.0] * 4
-    assert trial.claims[1].holds is True
+    assert min(trial.claims[1].numbers) > 0.0
