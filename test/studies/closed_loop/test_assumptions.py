@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/assumptions.md lists every assumed number, with the right values."""
+"""docs/assumptions.md and settings_assumed.md list every assumed number, with the right values."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import dataclasses
 import fnmatch
 import importlib
 import inspect
+import itertools
 import json
 import pathlib
 import re
@@ -20,6 +21,7 @@ from studies.closed_loop import assumptions, policies
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PAGE = ROOT / 'docs' / 'assumptions.md'
+PAGES = (PAGE, ROOT / 'docs' / 'settings_assumed.md')
 DOCUMENT = ROOT / 'docs' / 'charts' / 'assumptions.json'
 FILES = sorted(
     path
@@ -54,10 +56,12 @@ class Row(NamedTuple):
 
 
 def rows():
-    """Return the rows of every table with a column ``where``."""
+    """Return the rows of every table with a column ``where``, on both pages."""
     found = []
     header: list[str] = []
-    for line in PAGE.read_text(encoding='utf-8').splitlines():
+    for line in itertools.chain(
+        *(page.read_text(encoding='utf-8').splitlines() for page in PAGES)
+    ):
         if not line.startswith('|'):
             header = []
             continue
@@ -150,7 +154,7 @@ def test_every_default_is_on_the_page(module, name):
     quoted = {r.key.removeprefix(f'{name}.'): r.number for r in ROWS if r.pattern == module}
     # Seed and values that every scene gives are no assumptions of the code.
     for key in found.keys() - {'seed', 'hose_diameter', 'hose_length', 'pad_volume'}:
-        assert key in quoted, f'docs/assumptions.md does not mention {module}: {name}.{key}'
+        assert key in quoted, f'docs/settings_assumed.md does not mention {module}: {name}.{key}'
         assert quoted[key] == pytest.approx(found[key], rel=1e-12), f'{module}: {name}.{key}'
 
 
@@ -167,7 +171,7 @@ def test_quoted_constants_of_modules_agree():
 
 
 def test_measured_effects_are_those_of_the_study(document):
-    """Each measured row of the page has the figures of docs/charts/assumptions.json."""
+    """Each measured row of the pages has the figures of docs/charts/assumptions.json."""
     measured = document['assumptions']
     for entry in measured:
         pattern, key = entry['where'].split(': ')
