@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every figure of the README is in a file that a study wrote (docs/claims.yaml)."""
+"""Every figure of the README and of the front pages is in a file that a study wrote."""
 
 import json
-import math
 import pathlib
 import re
 
+import pytest
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CLAIMS = yaml.safe_load((ROOT / 'docs' / 'claims.yaml').read_text(encoding='utf-8'))
-WORDS = dict(enumerate(('two', 'three', 'four', 'five', 'six'), start=2)) | {12: 'twelve'}
+PAGES = 'README.md', 'docs/index.md', 'docs/gallery.md'
 
 
 def flat(text):
@@ -26,8 +26,6 @@ def names():
     functions = (abs, any, int, len, max, min, round, sum, zip)
     return charts | {
         '__builtins__': {function.__name__: function for function in functions},
-        'log10': math.log10,
-        'word': lambda number: WORDS.get(number, str(number)),
         'config': lambda path: yaml.safe_load((ROOT / 'config' / path).read_text()),
     }
 
@@ -42,27 +40,30 @@ def shown(claim):
     return flat(claim['text'].format(*values))
 
 
-def unwired(readme, claims):
-    """Return the README without the figures of claims and the texts that are no claims."""
-    text = flat(readme)
+def unwired(page, claims):
+    """Return a page without the figures of claims and the texts that are no claims."""
+    text = flat((ROOT / page).read_text(encoding='utf-8'))
     for claim in claims['claims']:
-        assert shown(claim) in text, f'the README has not: {shown(claim)}'
-        text = text.replace(shown(claim), re.sub(r'\{[^}]*\}', '', flat(claim['text'])))
-    for words in claims['no_claims']:
-        assert words in text, f'docs/claims.yaml: no_claims: {words!r} is not in the README'
+        if page in claim.get('pages', PAGES[:1]):
+            assert shown(claim) in text, f'{page} has not: {shown(claim)}'
+            text = text.replace(shown(claim), re.sub(r'\{[^}]*\}', '', flat(claim['text'])))
+    for words in claims['no_claims'][page]:
+        assert words in text, f'docs/claims.yaml: no_claims: {words!r} is not on {page}'
         text = text.replace(words, '')
     return text
 
 
-def test_every_number_of_the_readme_is_wired():
-    text = unwired((ROOT / 'README.md').read_text(encoding='utf-8'), CLAIMS)
-    text = re.sub(r'\]\([^)]*\)', ']', text)  # targets of links
+@pytest.mark.parametrize('page', PAGES)
+def test_every_number_of_the_page_is_wired(page):
+    text = re.sub(r'\]\([^)]*\)', ']', unwired(page, CLAIMS))  # targets of links
+    text = re.sub(r'`(pad|python) [^`]*`', '', text)  # commands
     left = re.findall(r'.{0,30}\d.{0,30}', text)
     assert not left, f'neither a claim nor a no_claim of docs/claims.yaml: {left}'
 
 
 def test_every_claim_says_how_it_was_got():
     for claim in CLAIMS['claims']:
-        assert claim['how'] and claim['command']
+        assert {'from', 'sample', 'interval', 'how', 'command'} <= claim.keys(), claim['text']
+        assert (ROOT / claim['from']).is_file()
         assert claim['command'].startswith(('pad ', 'python -m studies '))
         assert '{' in claim['text'] or claim['must']

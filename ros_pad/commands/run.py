@@ -13,9 +13,9 @@ import argparse
 import contextlib
 import dataclasses
 import json
+import math
 import os
 import pathlib
-import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -252,29 +252,24 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path | None) 
     }
 
 
-def _at_most(term: dict[str, Any]) -> str:
-    """Return a bound, of what it is a share, and whether its effect is too large."""
-    if term['bound'] is None:
-        return 'no bound known'
-    often = '95 of 100 times ' if term['kind'] == 'promise' else ''
-    of_what = re.split('[:;,]', term['reason'])[0]
-    text = f'{often}at most {100.0 * term["bound"]:.1f} % {of_what}'
-    return text + (', exceeds the accuracy required' if term['exceeds'] else '')
-
-
 def _show(trial: Trial) -> None:
     own, settings = trial.metrics, trial.settings
     assert own is not None
+    bound = None if own.verdict else settings['fidelity_bound']
     print(
-        f'\n{trial.scene}, seed {trial.seed}, {trial.fidelity}: {own.distance_m:.2f} m in'
-        f' {own.cycles:.3g} cycles, {trial.real_time_factor:.1f} times real time\n'
-        f'fidelity: {bag_notes.promise(trial)}\nsensing:  {settings["sensing"]}\n'
+        f'\n{trial.scene}, seed {trial.seed}, simulated on level {trial.fidelity}:'
+        f' {own.distance_m:.2f} m in {own.cycles:.3g} gait cycles'
     )
+    accuracy = bag_notes.promise(trial)
+    if bound is not None:
+        most = f'within {math.ceil(1e3 * bound) / 10.0:.1f} % of the finest simulation'
+        accuracy = f'{most}, in 95 of 100 scenes like this one'
+    print(f'accuracy: {accuracy}\n')
     rows = [{'policy': trial.policy, **own.as_dict()}, *settings['comparison']]
     for row in rows:
         if row.get('goal_m') is not None:
             seconds = row['time_to_goal_s']
-            after = 'not reached' if seconds is None else f'after {seconds:.1f} s'
+            after = 'not reached' if seconds is None else f'reached after {seconds:.1f} s'
             print(f'{row["policy"]}: goal of {row["goal_m"]:g} m {after}')
     table = []
     for row in rows:
@@ -282,15 +277,27 @@ def _show(trial: Trial) -> None:
         if row is not rows[0] and own.distance_per_cycle_m:
             gain = f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+z.0f} %'
         slip = sum(row['slip_path_m']) / len(row['slip_path_m'])
-        switches = str(sum(row['switches']))
-        table.append([row['policy'], f'{1e3 * advance:.1f}', gain, f'{slip:.2f} m', switches])
-    against = f'against {trial.policy}'
-    print_table(['policy', 'mm/cycle', against, 'slip path per foot', 'switches'], table)
-    taken = ', '.join(term['term'] for term in settings['taken'])
+        changes = sum(row['switches'])
+        feet = _FEET[row['policy']] + (f', {changes} changes' if changes else '')
+        table.append([row['policy'], f'{1e3 * advance:.1f} mm', gain, f'{slip:.2f} m', feet])
+    print_table(
+        ['policy', 'distance a cycle', f'beside {trial.policy}', 'slip of a foot', ''], table
+    )
     print(
         *(f'stayed flat: {refusal}' for refusal in own.refusals),
         *(f'fault: {fault}' for fault in fault_lines(own.faults)),
-        f'modelled: {taken or "none of the terms that may be left out"}',
-        *(f'left out: {term["term"]} ({_at_most(term)})' for term in settings['omitted']),
+        *(
+            f'left out, and it matters: {each["term"]}: {each["reason"]}'
+            for each in settings['omitted']
+            if each['exceeds']
+        ),
         sep='\n',
     )
+
+
+_FEET = {
+    'adaptive': 'flat or dome by what its feet felt',
+    'flat': 'always flat',
+    'dome': 'always domes',
+    'oracle': 'flat or dome by the true ground ahead',
+}

@@ -248,7 +248,8 @@ def _paths(walks: Walks, number: int) -> Explained:
     at: dict[str, Any] = {'figure': number, 'seeds': f'{len(SEEDS)} floors, L2'}
     claims = (
         claim('wet flat feet leave', wet,
-              np.median(shares['wet_flat']) > STRAIGHT and wet.min() > dry, wet=wet, dry=dry, **at),
+              np.median(shares['wet_flat']) > STRAIGHT and wet.min() > dry,
+              wet=wet, dry=dry, **at),
         claim('wet domes keep a', dome, straight <= STRAIGHT, aside=dome, straight=straight, **at),
     )  # fmt: skip
     asides = '; '.join(
