@@ -75,7 +75,7 @@ def figures(results: list[Result], progress: Progress | None = None) -> dict[str
 
 def figure(results: list[Result]) -> Figure:
     """Return the chart: times and errors of the methods, and below errors of the laws."""
-    above, below = inches(results), 3.7
+    above, below = inches(results), 4.3
     whole = Figure(figsize=(WIDTH, above + below), layout='constrained')
     parts: Any = whole.subfigures(2, 1, height_ratios=(above, below))
     draw(results, parts[0])
