@@ -15,19 +15,12 @@ from matplotlib.lines import Line2D
 from ros_pad.pace import Progress
 from studies import command
 from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, SKY, STYLE, VERMILION
-from studies.work_precision.walk.hexapod import DRAKE, TOP
+from studies.work_precision.walk.hexapod import DRAKE
 from studies.work_precision.walk.results import FAILED, WalkResult
 from studies.work_precision.walk.walkers import HEXAPOD, RAIL
 
 # Methods that are shown walk by walk.
 SHOWN = ('L1, 4 ms', 'L2, 1 ms', 'L2 without landing, 1 ms', 'MuJoCo defaults, 2 ms')
-# Name, unit and scale of each error.
-_UNITS = {
-    'distance': ('distance', '%', 1e2),
-    'slip': ('slip path of a foot', '%', 1e2),
-    'lateral': ('drift aside', 'mm a cycle', 1e3),
-    'yaw': ('heading', 'mrad a cycle', 1e3),
-}
 
 
 def table(results: Sequence[WalkResult]) -> str:
@@ -41,7 +34,7 @@ def table(results: Sequence[WalkResult]) -> str:
         ]
         lines.append(command.listed(rows, f'\n{robot}: distance (slip), mm a cycle'))
     if DRAKE not in {result.family for result in results}:
-        lines.append('left out: Drake, and a reference of two engines: pip install drake')
+        lines.append('left out: Drake, the reference of another engine: pip install drake')
     return '\n'.join(lines)
 
 
@@ -73,17 +66,17 @@ _LOOKS: dict[str, dict[str, Any]] = {
 
 
 def draw(results: Sequence[WalkResult]) -> Figure:
-    """Return the picture: time against each error, distances walk by walk, and the rail leg."""
+    """Return the picture: time against errors, distances walk by walk, and the rail leg."""
     hexapod, rail = (
         [result for result in results if result.robot == robot] for robot in (HEXAPOD, RAIL)
     )
     with matplotlib.rc_context(STYLE | {'lines.markersize': 6.0}):
-        figure = Figure(figsize=(11.5, 8.0), layout='constrained')
-        panels = figure.subplots(2, 3).ravel()
-        for letter, place, name in zip('abce', (0, 1, 2, 4), _UNITS, strict=True):
-            _errors(panels[place], hexapod, name, f'{letter}  hexapod: {_UNITS[name][0]}')
-        _strips(panels[3], hexapod)
-        _errors(panels[5], rail, 'distance', 'f  rail leg: distance')
+        figure = Figure(figsize=(10.0, 8.4), layout='constrained')
+        panels = figure.subplots(2, 2).ravel()
+        _errors(panels[0], hexapod, 'distance', 'a  hexapod: distance')
+        _errors(panels[1], hexapod, 'slip', 'b  hexapod: slip path of a foot')
+        _strips(panels[2], hexapod)
+        _errors(panels[3], rail, 'distance', 'd  rail leg: distance')
         families = {result.family for result in results}
         handles = [
             Line2D([], [], ls='', label=_with_steps(family, results), **look)
@@ -91,9 +84,10 @@ def draw(results: Sequence[WalkResult]) -> Figure:
             if family in families
         ]
         handles.append(
-            Line2D([], [], color=PALE, alpha=0.5, lw=7.0, label='doubt about the reference')
+            Line2D([], [], color=PALE, alpha=0.5, lw=7.0, label='step error of this reference')
         )
-        title = 'Mark: median of the walks; whisker: the worst.'
+        title = f'a to c: against {hexapod[0].top}; lighter: against the mean of it and'
+        title += f' {hexapod[0].second}.\nMark: median of the walks; whisker: the worst walk.'
         figure.legend(handles=handles, loc='outside lower center', ncol=4, title=title)
     return figure
 
@@ -107,23 +101,26 @@ def _with_steps(family: str, part: Sequence[WalkResult]) -> str:
 
 def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> None:
     """Draw time over the error called ``name``: mark at the median, whisker to the worst walk."""
-    _, unit, scale = _UNITS[name]
-    panel.set(xscale='log', yscale='log', title=title, ylabel=f'error, {unit}')
+    panel.set(xscale='log', yscale='log', title=title, ylabel='error, %')
     panel.set_xlabel('time for a simulated second, ms')
+    shown = [result for result in part if result.method != result.top]
     for family, look in _LOOKS.items():
-        mine = [result for result in part if result.family == family]
+        mine = [result for result in shown if result.family == family]
         mine.sort(key=lambda result: result.step_s or 0.0)
         x = [result.ms_per_second for result in mine]
-        y = [scale * result.errors[name] for result in mine]
+        y = [1e2 * result.errors[name] for result in mine]
         panel.plot(x, y, ls='-', lw=1.0, zorder=3, **look)
+        panel.plot(x, [1e2 * r.mean_errors[name] for r in mine], ls='', alpha=0.35, **look)
         for result, at, error in zip(mine, x, y, strict=True):
-            ends = [error, scale * result.worst[name]]
+            ends = [error, 1e2 * result.worst[name]]
             panel.plot([at, at], ends, '-_', color=look['color'], lw=1.0, ms=5, alpha=0.5)
-    # The doubt: half of the difference of two references, or the one with half of its step.
-    halved = [r.errors[name] for r in part if r.family == TOP and r.method != r.top]
-    if part and (doubt := scale * (part[0].band[name] or max(halved, default=0.0))):
-        panel.axhspan(1e-9, doubt, color=PALE, alpha=0.35, lw=0, zorder=0)
-        panel.set_ylim(bottom=0.3 * doubt)
+    # Of two results of the reference's engine, by the finest steps.
+    same = [r for r in shown if r.family == part[0].top.split(',')[0] and r.step_s]
+    if same:
+        nearest = min(same, key=lambda result: result.step_s)
+        panel.axhspan(1e-9, 1e2 * nearest.errors[name], color=PALE, alpha=0.35, lw=0, zorder=0)
+        panel.set_ylim(bottom=30.0 * min(nearest.errors[name], nearest.mean_errors[name]))
+    panel.margins(0.08)
     panel.xaxis.set_major_formatter('{x:g}')
     panel.yaxis.set_major_formatter('{x:g}')
     panel.grid(color=PALE, alpha=0.25, lw=0.5)
@@ -140,5 +137,5 @@ def _strips(panel: Axes, part: Sequence[WalkResult]) -> None:
         panel.axvline(limit, color=BLACK, lw=0.8, ls=':' if limit else '-', zorder=1)
     panel.set_yticks(range(len(names)), names)
     panel.set_ylim(len(names) - 0.5, -0.5)
-    panel.set(title='d  hexapod: distance, walk by walk', xlabel='distance off by, %')
+    panel.set(title='c  hexapod: distance, walk by walk', xlabel='distance off by, %')
     panel.grid(axis='y', color=PALE, alpha=0.25, lw=0.5)
