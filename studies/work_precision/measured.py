@@ -19,11 +19,10 @@ from ros_pad.contact.fits import Constant
 from ros_pad.contact.hyperelastic import highest_dome, pressure_for_height
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array, with_constant
-from studies.drawing import BLACK, BLUE, GREEN, PALE
+from studies.drawing import BLACK, BLUE, DARK, GREEN, LIGHT, PALE
 from studies.work_precision.comparison import Method, Problem, both
 
 THICKNESS = 0.4e-3  # m, of the thesis' pad
-DARK, LIGHT = '#005A43', '#73CFB0'  # shades of GREEN
 ROUNDING = 0.05e-3  # m: half of the last digit of most lengths
 QUANTITIES = ('height', 'gap', 'contact radius', 'force limit')
 

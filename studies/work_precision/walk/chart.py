@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from ros_pad.pace import Progress
 from studies import command
-from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, SKY, STYLE, VERMILION
+from studies.drawing import BLACK, BLUE, DARK, GREEN, LIGHT, ORANGE, PALE, STYLE, VERMILION
 from studies.work_precision.walk.hexapod import DRAKE
 from studies.work_precision.walk.results import FAILED, WalkResult
 from studies.work_precision.walk.walkers import HEXAPOD, RAIL
@@ -50,17 +50,14 @@ def figures(results: Sequence[WalkResult], progress: Progress | None = None) -> 
     return {'walk': draw(results)}
 
 
-_RING: dict[str, Any] = {'marker': 'o', 'mfc': 'none', 'ms': 10.0}
 _LOOKS: dict[str, dict[str, Any]] = {
-    'L1': {'color': BLUE, 'marker': 'o'},
-    'L1, compiled': {'color': SKY, 'marker': 's'},
-    'L1 without landing': {'color': BLUE, **_RING},
+    'L1': {'color': DARK, 'marker': 'o'},
+    'L1, compiled': {'color': LIGHT, 'marker': 's'},
     'L2': {'color': GREEN, 'marker': 'D'},
     'L2 without landing': {'color': ORANGE, 'marker': 'D', 'mfc': 'none'},
     'MuJoCo defaults': {'color': VERMILION, 'marker': 'X'},
     DRAKE: {'color': BLACK, 'marker': '^'},
     'RailLeg': {'color': GREEN, 'marker': 'o'},
-    'RailLeg without landing': {'color': GREEN, **_RING},
     'solve_ivp, events, 1e-6': {'color': BLUE, 'marker': 'D'},
 }
 
@@ -86,15 +83,17 @@ def draw(results: Sequence[WalkResult]) -> Figure:
         handles.append(
             Line2D([], [], color=PALE, alpha=0.5, lw=7.0, label='step error of this reference')
         )
-        title = f'a to c: against {hexapod[0].top}; lighter: against the mean of it and'
-        title += f' {hexapod[0].second}.\nMark: median of the walks; whisker: the worst walk.'
+        top, second = hexapod[0].top, hexapod[0].second
+        title = f'Mark: median of the walks; whisker: the worst. a to c: errors against {top}'
+        title += f';\nlighter: against the mean of it and {second}.' if second != top else '.'
         figure.legend(handles=handles, loc='outside lower center', ncol=4, title=title)
     return figure
 
 
 def _with_steps(family: str, part: Sequence[WalkResult]) -> str:
     """Return the name of a family with its shortest and longest step, ms."""
-    steps = [1e3 * each.step_s for each in part if each.family == family and each.step_s]
+    shown = [each for each in part if each.family == family and each.method != each.top]
+    steps = [1e3 * each.step_s for each in shown if each.step_s]
     ends = dict.fromkeys(f'{step:g}' for step in (min(steps), max(steps))) if steps else ()
     return f'{family}: {" to ".join(ends)} ms' if ends else family
 
