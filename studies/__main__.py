@@ -15,7 +15,7 @@ STUDIES = {
     'capillary': ('work_precision.capillary', 'methods for liquid on meshes (2 min)'),
     'walk': ('work_precision.walk.study', 'fidelity levels of a walk (1 min, with Drake 30 min)'),
     'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (30 s)'),
-    'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
+    'stability': ('work_precision.stability', 'where usual methods and ours go wrong (15 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (20 min)'),
     'priors': ('work_precision.estimator.priors', 'friction with wrong foot files (15 min)'),
     'sensing': ('sensing.study', 'body and slip from IMU, joints and forces (3 min)'),

@@ -11,7 +11,9 @@ from ros_pad.reports.style import STYLE as PAGE_STYLE
 __all__ = [
     'BLACK',
     'BLUE',
+    'DARK',
     'GREEN',
+    'LIGHT',
     'ORANGE',
     'PALE',
     'PAPER_STYLE',
@@ -22,5 +24,6 @@ __all__ = [
 ]
 
 SKY, ORANGE, PURPLE = '#56B4E9', '#E69F00', '#CC79A7'  # Okabe and Ito
+DARK, LIGHT = '#005A43', '#73CFB0'  # shades of GREEN
 
 STYLE: dict[Any, Any] = PAGE_STYLE | {'font.size': 9.0, 'axes.titlesize': 9.5}

@@ -82,6 +82,11 @@ class Method:
     ours: bool = False
 
 
+def both(name: str, solve: Callable[..., Any]) -> tuple[Method, Method]:
+    """Return a method of ros_pad, for one case and for batches."""
+    return Method(name, solve, ours=True), Method(f'{name}, batch', solve, batch=True, ours=True)
+
+
 Result = SimpleNamespace
 """Result of a method on a problem.
 

@@ -30,8 +30,8 @@ from ros_pad.contact.pad import Array
 from ros_pad.errors import NoEquilibrium
 from ros_pad.pace import Progress
 from studies.drawing import GREEN, PALE, VERMILION
-from studies.work_precision import measured
-from studies.work_precision.comparison import WIDTH, Method, Problem, Result, draw, inches, run
+from studies.work_precision import comparison, measured
+from studies.work_precision.comparison import Method, Problem, Result, both, run
 
 PAD = LARGE_PAD
 BASELINE = 'fsolve, good start'
@@ -75,10 +75,10 @@ def figures(results: list[Result], progress: Progress | None = None) -> dict[str
 
 def figure(results: list[Result]) -> Figure:
     """Return the chart: times and errors of the methods, and below errors of the laws."""
-    above, below = inches(results), 3.7
-    whole = Figure(figsize=(WIDTH, above + below), layout='constrained')
+    above, below = comparison.inches(results), 4.3
+    whole = Figure(figsize=(comparison.WIDTH, above + below), layout='constrained')
     parts: Any = whole.subfigures(2, 1, height_ratios=(above, below))
-    draw(results, parts[0])
+    comparison.draw(results, parts[0])
     measured.draw(parts[1])
     return whole
 
@@ -141,8 +141,7 @@ def _free_methods(problem: Problem) -> tuple[Method, ...]:
         Method('fsolve, start at the pad radius', lambda p: _free_fsolve(p, _R)),
         Method(BASELINE, lambda p: _free_fsolve(p, starts[p])),
         Method('brentq', _free_brentq),
-        Method('inflate', lambda p: inflate(PAD, p).height, ours=True),
-        Method('inflate, batch', lambda p: inflate(PAD, p).height, batch=True, ours=True),
+        *both('inflate', lambda p: inflate(PAD, p).height),
     )
 
 
@@ -273,8 +272,7 @@ def _pressed_methods(starts: dict[tuple[float, float], Start]) -> tuple[Method, 
         Method('fsolve, start at 0.1 and 1 mm', lambda p, f: _pressed_fsolve(p, f, cold)),
         Method(BASELINE, lambda p, f: _pressed_fsolve(p, f, starts[p, f])),
         Method('brentq, one unknown', _pressed_brentq),
-        Method('press', lambda p, f: press(PAD, p, f).height, ours=True),
-        Method('press, batch', lambda p, f: press(PAD, p, f).height, batch=True, ours=True),
+        *both('press', lambda p, f: press(PAD, p, f).height),
     )
 
 
@@ -329,20 +327,8 @@ def membrane_gap(pressure: float, force: float) -> float:
 
 GAP_METHODS = (
     Method(QUADRATURE, membrane_gap),
-    Method('press, membrane', lambda p, f: press(PAD, p, f, model='membrane').gap, ours=True),
-    Method(
-        'press, membrane, batch',
-        lambda p, f: press(PAD, p, f, model='membrane').gap,
-        batch=True,
-        ours=True,
-    ),
-    Method('press, spherical cap', lambda p, f: press(PAD, p, f, 'none').gap, ours=True),
-    Method(
-        'press, spherical cap, batch',
-        lambda p, f: press(PAD, p, f, 'none').gap,
-        batch=True,
-        ours=True,
-    ),
+    *both('press, membrane', lambda p, f: press(PAD, p, f, model='membrane').gap),
+    *both('press, spherical cap', lambda p, f: press(PAD, p, f, 'none').gap),
 )
 
 

@@ -19,10 +19,11 @@ from ros_pad.contact.fits import Constant
 from ros_pad.contact.hyperelastic import highest_dome, pressure_for_height
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array, with_constant
-from studies.drawing import BLACK, GREEN, ORANGE, PALE, PURPLE, VERMILION
-from studies.work_precision.comparison import Method, Problem
+from studies.drawing import BLACK, BLUE, DARK, GREEN, LIGHT, PALE
+from studies.work_precision.comparison import Method, Problem, both
 
 THICKNESS = 0.4e-3  # m, of the thesis' pad
+ROUNDING = 0.05e-3  # m: half of the last digit of most lengths
 QUANTITIES = ('height', 'gap', 'contact radius', 'force limit')
 
 REFERENCE_SOLID = (
@@ -65,13 +66,15 @@ class Model:
         As chosen, and at both ends; empty where the points are given.
     model : str
         That of :func:`ros_pad.contact.press`.
-    colour : str
+    colour, marker : str
+        Of its marks.
     """
 
     name: str
     pads: tuple[Pad, ...]
     model: str
     colour: str
+    marker: str
 
 
 def thesis() -> Measurements:
@@ -102,10 +105,10 @@ def models() -> tuple[Model, ...]:
     material = Material.load('dragon_skin_10')
     sheet = Pad.of(material, LARGE_PAD.radius, THICKNESS)
     return (
-        Model('spherical cap, k = 40 N/m', caps, 'thesis', VERMILION),
-        Model('exact membrane of that law', caps, 'membrane', ORANGE),
-        Model('hyperelastic membrane', _fitted(sheet), 'membrane', GREEN),
-        Model('solid of another study', (), '', PURPLE),
+        Model('spherical cap, k = 40 N/m', caps, 'thesis', DARK, 'o'),
+        Model('exact membrane of that law', caps, 'membrane', LIGHT, 's'),
+        Model('hyperelastic membrane', _fitted(sheet), 'membrane', GREEN, 'D'),
+        Model('solid of another study', (), '', BLUE, 'X'),
     )
 
 
@@ -169,9 +172,7 @@ def problem() -> tuple[Problem, tuple[Method, ...]]:
         wrong=math.inf,
     )
     return question, tuple(
-        Method(name, gap_of(model), batch, ours=True)
-        for model in models()[:3]
-        for name, batch in ((model.name, False), (f'{model.name}, batch', True))
+        method for model in models()[:3] for method in both(model.name, gap_of(model))
     )
 
 
@@ -186,16 +187,16 @@ def draw(figure: SubFigure) -> None:
     measured, chosen = points(), models()
     panel = figure.subplots()
     places = np.arange(len(measured.kind)) + 0.6 * np.array(measured.kind)
+    rounded = 100.0 * ROUNDING / np.where(np.array(measured.kind) < 3, measured.value, np.nan)
+    panel.bar(places, 2.0 * rounded, 0.8, -rounded, color=PALE, alpha=0.35, label='rounding')
     for row, model in enumerate(chosen):
         errors = 100.0 * (predicted(model, measured) / measured.value - 1.0)
-        shift = 0.15 * (row - 0.5 * (len(chosen) - 1))
+        at = places + 0.19 * (row - 0.5 * (len(chosen) - 1))
         low, high = np.fmin.reduce(errors), np.fmax.reduce(errors)
-        panel.vlines(places + shift, low, high, color=model.colour, lw=2.0, alpha=0.5)
+        panel.vlines(at, low, high, color=model.colour, lw=2.0, alpha=0.5)
         gone = np.isnan(errors).any(axis=0) & ~np.isnan(errors[0])
-        panel.plot((places + shift)[gone], high[gone] + 9.0, '^', color=model.colour, ms=6)
-        panel.plot(
-            places + shift, errors[0], 'o', color=model.colour, ms=6, mec='white', label=model.name
-        )
+        panel.plot(at[gone], high[gone] + 9.0, '^', color=model.colour, ms=6)
+        panel.plot(at, errors[0], model.marker, color=model.colour, ms=6, label=model.name)
     panel.axhline(0.0, color=BLACK, lw=0.8)
     labels = [
         f'{pressure / 1e3:.0f} kPa' + ('' if not force > 0.0 else f'\n{force:g} N')
@@ -210,8 +211,11 @@ def draw(figure: SubFigure) -> None:
     panel.spines[['top', 'right']].set_visible(False)
     figure.legend(loc='outside upper center', ncols=3, frameon=False, fontsize=9.0)
     figure.supxlabel(
-        'Error against each measured point of the thesis. Bars: 95 % interval of the constant that'
-        ' is fitted\nto the heights (cap: disc at the 40 N/m of the thesis); triangle: it has no'
-        ' state at one end.\nForce limits: gap of a sheet.',
+        'Error against each measured point of the thesis. Green: laws that ros_pad solves; blue:'
+        ' others.\nBars: 95 % interval of the constant that is fitted to the heights (cap: disc at'
+        ' the 40 N/m of the thesis);\ntriangle: no state at one end. Force limits: where the gap'
+        ' is as high as the sheet is thick.\nThe author of the thesis read the values off and'
+        ' rounded them: lengths by up to 0.05 mm (grey), forces by an\nunknown amount. Figures'
+        ' 16 to 18 of the thesis have error bars, for which its text gives no numbers.',
         fontsize=9.0,
     )

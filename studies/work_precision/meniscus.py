@@ -33,7 +33,7 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
 from studies.work_precision.capillary import dome, truth
-from studies.work_precision.comparison import Method, Problem, Result, chart, run
+from studies.work_precision.comparison import Method, Problem, Result, both, chart, run
 
 # The sphere is the dome of the large pad at 75 kPa; the liquid is water.
 RADIUS = inflate(LARGE_PAD, 75e3).sphere_radius
@@ -249,8 +249,7 @@ def _by_volume(
 def _bridge_methods(volumes: dict[Case, float]) -> tuple[Method, ...]:
     return (
         Method('4 π γ R cos θ, batch', _small_bridge, batch=True),
-        Method('circle', _circle, ours=True),
-        Method('circle, batch', _circle, batch=True, ours=True),
+        *both('circle', _circle),
         Method('circle, by volume', _by_volume(volumes, 'circle', 0.0), ours=True),
         Method(SHOOTING, _shooting(0.0)),
         Method('exact', _exact(0.0), ours=True),
@@ -309,9 +308,7 @@ def _ring(reading: str) -> Callable[[Any, Any], Any]:
 
 
 RING_METHODS = (
-    Method('thesis, 3.80', _ring('thesis'), ours=True),
-    Method('thesis, 3.80, batch', _ring('thesis'), batch=True, ours=True),
-    Method('corrected', _ring('corrected'), ours=True),
-    Method('corrected, batch', _ring('corrected'), batch=True, ours=True),
+    *both('thesis, 3.80', _ring('thesis')),
+    *both('corrected', _ring('corrected')),
     Method(BATH, lambda contact, sphere: bath(contact, sphere, 1e-8)),
 )

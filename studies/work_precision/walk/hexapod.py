@@ -93,16 +93,16 @@ def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
     walkers += [unlanded(walker) for walker in (_planar('L1', SAMPLE, False), *plain)]
     baseline = named('L2', LONGEST)
     if importlib.util.find_spec('pydrake'):
-        tops: tuple[Walker, ...] = (_full(TOP, replace(RECOMMENDED, timestep=1e-4)), _drake(1e-4))
-        walkers += [_drake(step) for step in (2e-4, 4e-4)]
+        tops: tuple[Walker, ...] = _drake(1e-4), _full('L2', replace(RECOMMENDED, timestep=1e-4))
+        others = [_drake(step) for step in (2e-4, 4e-4)]
     else:
         # The finer one shows the uncertainty of the reference.
-        walkers.append(_full(TOP, replace(RECOMMENDED, timestep=TOP_STEP / 2.0)))
-        tops = (_full(TOP, replace(RECOMMENDED, timestep=TOP_STEP)),)
-    return [*walkers, *tops], tuple(top.name for top in tops), baseline
+        tops = (_full('L2', replace(RECOMMENDED, timestep=TOP_STEP)),)
+        others = [_full('L2', replace(RECOMMENDED, timestep=TOP_STEP / 2.0))]
+    return [*walkers, *others, *tops], tuple(top.name for top in tops), baseline
 
 
-TOP, DRAKE = 'L2, top', 'Drake'
+DRAKE = 'Drake'
 
 
 def _planar(family: str, step: float, compiled: bool) -> Walker:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress
-from studies.work_precision.walk.walkers import HEXAPOD, RAIL, Walk, Walked, Walker
+from studies.work_precision.walk.walkers import Walk, Walked, Walker
 
 FAILED = 0.1  # relative error of distance or slip above which a walk has failed
 LEAST = 0.01  # share of the stride: errors of shorter distances are relative to this share
@@ -27,11 +27,11 @@ WalkResult = SimpleNamespace
 - ``ms_per_second``, ``us_per_step``: median computing time of a simulated second, ms, and of a
   step, us; on L2 of a step of MuJoCo
 - ``versus``: time of a simulated second over that of the baseline, median over walks of the ratio
-- ``baseline``, ``top``: names of the walkers that times and errors are relative to; errors may be
-  relative to the mean of two
-- ``band``: half of the difference of these two, median over walks, in the units of ``errors``
-- ``errors``, ``worst``: median and largest error of ``distance`` and ``slip`` (relative),
-  ``lateral`` (m a cycle) and ``yaw`` (rad a cycle), of walks without a verdict; else NaN
+- ``baseline``, ``top``: names of the walkers that times and errors are relative to
+- ``errors``, ``worst``: median and largest relative error of ``distance`` and ``slip``, of walks
+  without a verdict; else NaN
+- ``second``: name of a second reference, or again ``top``
+- ``mean_errors``: median errors relative to the mean of both references
 - ``failures``, ``slip_failures``: walks whose distance, or slip path, is off by more than 10 %, or
   that have no valid result; ``refused``: those that ended with a verdict or an error
 - ``cases``, ``cycles``: number of walks, and of gait cycles of each
@@ -39,8 +39,7 @@ WalkResult = SimpleNamespace
 - ``ours``: whether the method belongs to ros_pad
 """
 
-RELATIVE = ('distance', 'slip')
-MEASURES = {HEXAPOD: (*RELATIVE, 'lateral', 'yaw'), RAIL: RELATIVE}
+MEASURES = ('distance', 'slip')
 
 
 def run(
@@ -83,28 +82,23 @@ def _result(
     tops: Sequence[str],
     baseline: str,
 ) -> WalkResult:
-    here = went[walker.name]
-    truth = [_between(*pair) for pair in zip(went[tops[0]], went[tops[-1]], strict=True)]
+    here, truth = went[walker.name], went[tops[0]]
+    means = [_between(*pair) for pair in zip(truth, went[tops[-1]], strict=True)]
     durations = [walk.scene.duration for walk in walks]
     least = [LEAST * walk.scene.gait.stride for walk in walks]
     valid = [not each.verdict and math.isfinite(each.distance) for each in here]
-    off = {
-        measure: np.array(
-            [
-                _off(measure, each, true, floor) if good else math.nan
-                for each, true, good, floor in zip(here, truth, valid, least, strict=True)
-            ]
-        )
-        for measure in MEASURES[robot]
-    }
-    band = {
-        measure: median(
-            _off(measure, each, true, floor)
-            for each, true, floor in zip(went[tops[0]], truth, least, strict=True)
-        )
-        for measure in MEASURES[robot]
-    }
-    found = {measure: errors[np.isfinite(errors)] for measure, errors in off.items()}
+    off, apart = (
+        {
+            measure: np.array(
+                [
+                    _off(measure, each, true, floor) if good else math.nan
+                    for each, true, good, floor in zip(here, wanted, valid, least, strict=True)
+                ]
+            )
+            for measure in MEASURES
+        }
+        for wanted in (truth, means)
+    )
     return WalkResult(
         robot=robot,
         method=walker.name,
@@ -117,10 +111,14 @@ def _result(
             each.seconds / base.seconds for each, base in zip(here, went[baseline], strict=True)
         ),
         baseline=baseline,
-        top=' and '.join(tops),
-        band=band,
-        errors={name: median(errors) for name, errors in found.items()},
-        worst={name: max(errors, default=math.nan) for name, errors in found.items()},
+        top=tops[0],
+        errors={name: median(errors) for name, errors in off.items()},
+        worst={
+            name: max(errors[np.isfinite(errors)], default=math.nan)
+            for name, errors in off.items()
+        },
+        second=tops[-1],
+        mean_errors={name: median(errors) for name, errors in apart.items()},
         # NaN counts as an error above the limit.
         failures=int((~(off['distance'] <= FAILED)).sum()),
         slip_failures=int((~(off['slip'] <= FAILED)).sum()),
@@ -140,15 +138,14 @@ def _result(
 def _between(one: Walked, other: Walked) -> Walked:
     """Return the mean of two results of one walk."""
     means = {
-        measure: 0.5 * (getattr(one, measure) + getattr(other, measure))
-        for measure in ('distance', 'slip', 'lateral', 'yaw')
+        measure: 0.5 * (getattr(one, measure) + getattr(other, measure)) for measure in MEASURES
     }
     return replace(one, **means)
 
 
 def _off(measure: str, each: Walked, true: Walked, floor: float) -> float:
     found, wanted = getattr(each, measure), getattr(true, measure)
-    return float(abs(found - wanted) / (max(abs(wanted), floor) if measure in RELATIVE else 1.0))
+    return float(abs(found - wanted) / max(abs(wanted), floor))
 
 
 def median(values: Any) -> float:

@@ -2,9 +2,9 @@
 """Work-precision study of a walk: every fidelity level, MuJoCo's defaults, and Drake.
 
 The hexapod walks open loop, its pads at the pressure that a controller would begin with, on the
-floors of the shipped scenes. Errors are relative to the mean of two engines at 0.1 ms, L2 and
-Drake, whose contact has the spring and the damper of the pads; half of their difference is drawn
-as a band. Drake is needed for it (pip install drake, mainly BSD-3-Clause). Levels without landing
+floors of the shipped scenes. Errors are relative to Drake at 0.1 ms, whose contact has the spring
+and the damper of the pads, and again to the mean of it and L2 at 0.1 ms. Drake is needed for it
+(pip install drake, mainly BSD-3-Clause). Levels without landing
 have films of rigid discs and MuJoCo's own contact, which MuJoCo's defaults have as well.
 
 Without Drake, errors are relative to L2 with steps of 0.25 ms; the row with half of this step
