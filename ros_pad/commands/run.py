@@ -255,42 +255,35 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path | None) 
 def _show(trial: Trial) -> None:
     own, settings = trial.metrics, trial.settings
     assert own is not None
-    bound = None if own.verdict else settings['fidelity_bound']
-    print(
-        f'\n{trial.scene}, seed {trial.seed}, simulated on level {trial.fidelity}:'
-        f' {own.distance_m:.2f} m in {own.cycles:.3g} gait cycles'
-    )
-    accuracy = bag_notes.promise(trial)
-    if bound is not None:
+    accuracy, bound = bag_notes.promise(trial), settings['fidelity_bound']
+    if bound is not None and not own.verdict:
         most = f'within {math.ceil(1e3 * bound) / 10.0:.1f} % of the finest simulation'
         accuracy = f'{most}, in 95 of 100 scenes like this one'
-    print(f'accuracy: {accuracy}\n')
-    rows = [{'policy': trial.policy, **own.as_dict()}, *settings['comparison']]
-    for row in rows:
-        if row.get('goal_m') is not None:
-            seconds = row['time_to_goal_s']
-            after = 'not reached' if seconds is None else f'reached after {seconds:.1f} s'
-            print(f'{row["policy"]}: goal of {row["goal_m"]:g} m {after}')
-    table = []
-    for row in rows:
-        advance, gain = row['distance_per_cycle_m'], ''
-        if row is not rows[0] and own.distance_per_cycle_m:
+    print(
+        f'\n{trial.scene}, seed {trial.seed}, simulated on level {trial.fidelity}:'
+        f' {own.distance_m:.2f} m in {own.cycles:.3g} gait cycles\naccuracy: {accuracy}\n'
+    )
+    table: list[list[str]] = []
+    for row in ({'policy': trial.policy, **own.as_dict()}, *settings['comparison']):
+        advance, seconds = row['distance_per_cycle_m'], row.get('time_to_goal_s')
+        gain = ''
+        if table and own.distance_per_cycle_m:
             gain = f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+z.0f} %'
         slip = sum(row['slip_path_m']) / len(row['slip_path_m'])
         changes = sum(row['switches'])
         feet = _FEET[row['policy']] + (f', {changes} changes' if changes else '')
+        if row.get('goal_m') is not None:
+            after = 'not reached' if seconds is None else f'after {seconds:.1f} s'
+            feet += f'; goal of {row["goal_m"]:g} m {after}'
         table.append([row['policy'], f'{1e3 * advance:.1f} mm', gain, f'{slip:.2f} m', feet])
     print_table(
         ['policy', 'distance a cycle', f'beside {trial.policy}', 'slip of a foot', ''], table
     )
+    matters = [each for each in settings['omitted'] if each['exceeds']]
     print(
         *(f'stayed flat: {refusal}' for refusal in own.refusals),
         *(f'fault: {fault}' for fault in fault_lines(own.faults)),
-        *(
-            f'left out, and it matters: {each["term"]}: {each["reason"]}'
-            for each in settings['omitted']
-            if each['exceeds']
-        ),
+        *(f'left out, and it matters: {each["term"]}: {each["reason"]}' for each in matters),
         sep='\n',
     )
 

@@ -113,14 +113,7 @@ class Assumption:
     @property
     def only_adaptive(self) -> bool:
         """Whether the number changes walks of the adaptive policy only."""
-        return self.path.split('.')[0] not in (
-            'world',
-            'both',
-            'controller',
-            'limit_error',
-            'load_error',
-            'loss',
-        )
+        return self.path.split('.')[0] in ('tuning', 'constants', 'adaptive', 'control_period')
 
 
 FOOT = 'feet/large37.yaml: '

@@ -125,11 +125,8 @@ RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
 """Rivals with the settings that were best on the tuning grounds."""
 
 POLICIES = ('flat', 'dome', 'adaptive', *RIVALS, 'oracle')
-FRICTION = (
-    'friction', 'shear_strength', 'conforming_pressure', 'boundary_friction', 'critical_film',
-    'film_exponent',
-)  # fmt: skip
-"""Numbers of a foot file that decide its friction, all of them assumed."""
+FRICTION = 'friction', 'shear_strength', 'conforming_pressure', 'critical_film', 'film_exponent'
+"""How numbers of a foot file that decide its friction end, all of them assumed."""
 PAGE = command.ROOT / 'docs' / 'model' / 'policies.md'
 MARKS = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
 MAIN = ('flat', 'dome', 'adaptive', 'each 8 steps', 'oracle')
@@ -169,16 +166,12 @@ def _policy(name: str, is_wet: IsWet) -> Policy:
     return rival(*RIVALS[name]) if name in RIVALS else policy_named(name, is_wet)
 
 
-def _first(policy: str) -> str:
-    """Return the policy whose feet start as those of a policy do."""
-    return 'adaptive' if policy in RIVALS else policy
-
-
 def walk(job: Job) -> tuple[float, int, str | None]:
     """Return distance a cycle, m, number of switches, and the verdict, None for a valid walk."""
     scene, known = ground(job.ground, job.cycles, job.slower)
     policy = _policy(job.policy, scene.floor.build(job.seed).wet)
-    loop = _walk(scene, known, policy, _first(job.policy), job.seed)
+    first = 'adaptive' if job.policy in RIVALS else job.policy
+    loop = _walk(scene, known, policy, first, job.seed)
     switches = sum(loop.controller.switches.values())
     return loop.robot.body[0] / scene.cycles, switches, loop.robot.verdict
 
@@ -292,7 +285,7 @@ def frictions() -> dict[str, list[float]]:
             for word in ('halved', 'doubled')
         ]
         for row in assumed['assumptions']
-        if row['where'].startswith('feet/') and row['where'].split()[-1] in FRICTION
+        if row['where'].startswith('feet/') and row['where'].endswith(FRICTION)
     }
 
 
@@ -412,7 +405,7 @@ def draw(document: Mapping[str, Any]) -> Figure:
     """Draw the adaptive policy against the better fixed shape and the oracle, ground by ground.
 
     First, for all held-out grounds together, the interval of chance beside what wrong assumptions
-    on friction do. Grounds in :data:`TUNED_ON` are hollow.
+    on friction do.
     """
     with rc_context(STYLE):
         figure = Figure(figsize=(7.6, 10.0), layout='constrained')
@@ -421,7 +414,7 @@ def draw(document: Mapping[str, Any]) -> Figure:
         names = ['how sure the gain is', f'chance: {len(whole["grounds"])} conditions']
         heads = [0]
         middle = whole['all']['ratios']['adaptive'][BETTER]['of_means']
-        _ratio(panel, 1, {**whole['clusters'], 'of_means': middle}, GREEN, False)
+        _ratio(panel, 1, {**whole['clusters'], 'of_means': middle}, GREEN)
         for name, (halved, doubled) in frictions().items():
             panel.plot([halved, doubled], [len(names)] * 2, color=BLACK, lw=0.8)
             panel.plot(halved, len(names), '<', color=BLACK, ms=5)
@@ -433,8 +426,9 @@ def draw(document: Mapping[str, Any]) -> Figure:
             for name, row in document[part]['grounds'].items():
                 for other, colour, shift in _LOOKS:
                     ratio = row['ratios']['adaptive'][other]
-                    _ratio(panel, len(names) + shift, ratio, colour, name in TUNED_ON)
-                names.append(f'{name} ({len(row["flat"]["seeds"])})')
+                    _ratio(panel, len(names) + shift, ratio, colour)
+                tuned = ', tuned on' if name in TUNED_ON else ''
+                names.append(f'{name} ({len(row["flat"]["seeds"])}{tuned})')
         panel.axvline(1.0, color='0.6', linewidth=0.8, zorder=0)
         panel.set_yticks(range(len(names)), names)
         for head in heads:
@@ -448,21 +442,18 @@ def draw(document: Mapping[str, Any]) -> Figure:
             Line2D([], [], color=colour, marker='o', ms=4, label=f'to the {name}')
             for name, colour, _ in _LOOKS
         ]
-        hollow = Line2D([], [], color=BLACK, marker='o', ls='', ms=4, mfc='white')
-        hollow.set_label('tuned on')
         handles += [
             Line2D([], [], color=BLACK, marker=marker, ls='', ms=5, label=f'friction {word}')
             for marker, word in (('<', 'halved'), ('>', 'doubled'))
         ]
-        figure.legend(handles=[*handles, hollow], loc='outside lower right', ncols=3)
+        figure.legend(handles=handles, loc='outside lower right', ncols=3)
     return figure
 
 
-def _ratio(panel: Axes, place: float, row: Mapping[str, float], colour: str, hollow: bool) -> None:
+def _ratio(panel: Axes, place: float, row: Mapping[str, float], colour: str) -> None:
     """Draw a ratio and its interval."""
     panel.plot([row['low'], row['high']], [place, place], color=colour, lw=1.2)
-    face = 'white' if hollow else colour
-    panel.plot(row['of_means'], place, 'o', color=colour, mfc=face, ms=4)
+    panel.plot(row['of_means'], place, 'o', color=colour, ms=4)
 
 
 def main(words: Sequence[str]) -> int:

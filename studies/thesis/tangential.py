@@ -228,7 +228,7 @@ def _claims(
         claim('dry the flat pad', dry, dry > 1.0, dry=dry, load=setup.highest_load,
               above=_above(drawn.flat_over_dome_dry, 1.0)),
         claim('wet the flat pad', (left, wet), wet > 1.0 and left < 0.5, left=left, wet=wet,
-              above=_above(drawn.dome_over_flat_wet, 1.0), sole=_smallest_sole(scene, limits)),
+              above=_above(drawn.dome_over_flat_wet, 1.0)),
         claim('domes hold nearly the', lost, lost <= MINIMAL, lost=lost,
               above=_above(drawn.dome_wet_over_dry, 0.9)),
         _adds_claim(drawn, pick(rows, 'wet less dry'), capillary[BOUND], ends),
@@ -275,12 +275,11 @@ def _above(ratios: Array, least: float) -> str:
 
 
 def _adds_claim(drawn: _Draws, less: Sequence[Row], bound: Array, ends: Array) -> Claim:
-    """Return the verdict on the title: decided where nearly all draws are on one side of 0."""
+    """Return what is left of wet less dry force in draws of the assumed numbers."""
     lost, lines = modelled(less) / ends, float(bound.max())
     low, high = np.quantile(drawn.gain_with_lines, (0.05, 0.95))
-    holds = True if low > 0.0 else False if high < 0.0 else None
     return claim(
-        'title liquid adds to', (*lost, low, high), holds,
+        'title liquid adds to', (*lost, low, high), None,
         lost=lost, lines=1e3 * lines, share=lines / ends.min(), low=100.0 * low, high=high,
         above=_above(drawn.gain_with_lines, 0.0),
     )  # fmt: skip
@@ -318,30 +317,6 @@ def _rise_claim(setup: Any, rows: Sequence[Row]) -> Claim:
         inside=join(inside) if inside else 'no reading of 3.101',
         smallest=1e3 * ends[0], largest=1e3 * ends[1], corrected=1e3 * best['corrected'],
     )  # fmt: skip
-
-
-def _smallest_sole(scene: BenchScene, limits: Array) -> str:
-    """Return, as a sentence, the smallest sole that loses half of its force on wet ground.
-
-    The sentence is empty if no sole between pad and foot does so, or all of them do.
-    """
-    foot, load = scene.foot, float(limits.max())
-
-    def share(radius: float) -> float:
-        sole = replace(foot, sole_radius=radius)
-        dry, wet = (slip_force(sole, scene.setup, load, 0.0, wet) for wet in (False, True))
-        return wet / dry
-
-    low, high = foot.pad.radius, foot.sole_radius
-    if share(low) < 0.5 or share(high) > 0.5:
-        return ''
-    for _ in range(12):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if share(middle) > 0.5 else (low, middle)
-    return (
-        f'This needs a sole at least {2e3 * high:.1f} mm wide: under smaller ones the film drains'
-        ' during the slow drag, and the flat pad keeps more than half of its dry force.'
-    )
 
 
 def _omitted(scene: BenchScene, rows: Sequence[Row]) -> tuple[Omission, ...]:

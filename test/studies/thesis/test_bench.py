@@ -106,21 +106,20 @@ def test_the_orderings_can_fail():
 
 
 @pytest.mark.parametrize(
-    'changes, holds',
+    'changes, sign',
     [
-        ({'boundary_friction': 3.0, 'friction': 0.05}, True),  # every film holds more than none
-        ({'critical_film': 2e-8}, False),  # every film keeps the dome from the floor
+        ({'boundary_friction': 3.0, 'friction': 0.05}, 1),  # every film holds more than none
+        ({'critical_film': 2e-8}, -1),  # every film keeps the dome from the floor
     ],
 )
-def test_the_title_is_decided_where_all_draws_agree(changes, holds):
+def test_the_sign_of_what_liquid_adds_follows_from_assumed_numbers(changes, sign):
     scene = TRIALS['tangential'].scene
     trial = bench.run(dataclasses.replace(scene, foot=dataclasses.replace(scene.foot, **changes)))
     (claim,) = (claim for claim in trial.claims if 'Title' in claim.thesis)
-    assert claim.holds is holds
+    assert sign * min(claim.numbers[-2:], key=abs) > 0.0 and claim.verdict == 'underdetermined'
     (shipped,) = (claim for claim in TRIALS['tangential'].claims if 'Title' in claim.thesis)
     # By hand: a load that comes in 1 s lays 11 nm at the edge, and twice as much at an eighth of
     # its area, so about 1 − exp(−0.03²) of the dry force is lost.
-    assert shipped.verdict == 'underdetermined'
     assert min(shipped.numbers[:3]) > -0.0015 and max(shipped.numbers[:3]) < -0.0005
 
 
