@@ -179,7 +179,7 @@ def _walk(
     if options.json:
         print(json.dumps(summary))
     else:
-        _show(trial)
+        _show(trial, trial.metrics)
         if bag:
             print(f'bag:      {bag}')
         print(f'report:   {page or "none: without Matplotlib there are no pictures"}')
@@ -252,9 +252,8 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path | None) 
     }
 
 
-def _show(trial: Trial) -> None:
-    own, settings = trial.metrics, trial.settings
-    assert own is not None
+def _show(trial: Trial, own: Metrics) -> None:
+    settings = trial.settings
     accuracy, bound = bag_notes.promise(trial), settings['fidelity_bound']
     if bound is not None and not own.verdict:
         most = f'within {math.ceil(1e3 * bound) / 10.0:.1f} % of the finest simulation'

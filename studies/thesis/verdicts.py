@@ -13,11 +13,10 @@ from studies.thesis import walks
 from studies.thesis.explained import Claim, Explained, counted
 from studies.thesis.tangential import DRAWS
 
-PAGES = {'3': command.ROOT / 'docs' / 'thesis.md', '4, 5': command.ROOT / 'docs' / 'thesis_4_5.md'}
-"""Pages of docs by the chapters whose statements they have."""
+PAGES = {'thesis.md': '3', 'thesis_4_5.md': '457'}
+"""Pages of docs, and the chapters whose statements they have."""
 
 MARK = '<!-- below: python -m studies thesis --table -->\n'
-_HEAD = ('where', 'the thesis states', 'verdict', 'why')
 
 
 def document(figures: Sequence[Explained], text: Sequence[Claim]) -> dict[str, Any]:
@@ -40,16 +39,15 @@ def _order(claim: Claim) -> tuple[list[int], int]:
 
 def tables(kept: Mapping[str, Any]) -> Iterator[tuple[Any, str]]:
     """Return each page of docs with what stands on it below :data:`MARK`, as Markdown."""
-    lines: dict[Any, list[tuple[str, ...]]] = {page: [] for page in PAGES.values()}
-    for claim in kept['claims']:
-        chapter = re.findall(r'\d', claim['where'])[0]
-        verdict = f'[{claim["verdict"]}]({claim["see"]})' if claim['see'] else claim['verdict']
-        stated = claim['thesis'] + (f' ({claim["printed"]})' if claim['printed'] else '')
-        row = (claim['where'], stated, verdict, claim['why'])
-        lines[PAGES['3' if chapter == '3' else '4, 5']].append(row)
-    for page, rows in lines.items():
-        table = ''.join(f'| {" | ".join(row)} |\n' for row in (_HEAD, ('---',) * 4, *rows))
-        yield page, f'Of all {kept["statements"]} statements {kept["counts"]}.\n\n{table}'
+    counts = f'Of all {kept["statements"]} statements {kept["counts"]}.\n\n'
+    for page, chapters in PAGES.items():
+        table = '| where | the thesis states | verdict | why |\n| --- | --- | --- | --- |\n'
+        for claim in kept['claims']:
+            if re.findall(r'\d', claim['where'])[0] in chapters:
+                verdict = f'[{claim["verdict"]}]({claim["see"]})'
+                stated = claim['thesis'] + (f' ({claim["printed"]})' if claim['printed'] else '')
+                table += f'| {claim["where"]} | {stated} | {verdict} | {claim["why"]} |\n'
+        yield command.ROOT / 'docs' / page, counts + table
 
 
 def write(kept: Mapping[str, Any]) -> None:
