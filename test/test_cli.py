@@ -235,7 +235,7 @@ def test_a_run_on_nodes_is_recorded_and_reported(tmp_path, environment):
     words = ('run', 'hexapod_patches', '--cycles', '4', '--out', out)
     child = python('-m', 'ros_pad', *words, env=environment)
     assert child.returncode == 0, child.stderr
-    for part in ('adaptive', 'flat', 'dome', 'oracle', 'distance a cycle', 'report.html'):
+    for part in ('adaptive', 'flat', 'dome', 'oracle', 'a gait cycle', 'report.html'):
         assert part in child.stdout
     summary = json.loads((out / 'summary.json').read_text())
     reader = BagReader(out / 'bag')

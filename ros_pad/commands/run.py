@@ -276,7 +276,7 @@ def _show(trial: Trial, own: Metrics) -> None:
             feet += f'; goal of {row["goal_m"]:g} m {after}'
         table.append([row['policy'], f'{1e3 * advance:.1f} mm', gain, f'{slip:.2f} m', feet])
     print_table(
-        ['policy', 'distance a cycle', f'beside {trial.policy}', 'slip of a foot', ''], table
+        ['policy', 'a gait cycle', f'beside {trial.policy}', 'slip of a foot', ''], table
     )
     matters = [each for each in settings['omitted'] if each['exceeds']]
     print(
@@ -288,8 +288,8 @@ def _show(trial: Trial, own: Metrics) -> None:
 
 
 _FEET = {
-    'adaptive': 'flat or dome by what its feet felt',
+    'adaptive': 'by what feet felt',
     'flat': 'always flat',
     'dome': 'always domes',
-    'oracle': 'flat or dome by the true ground ahead',
+    'oracle': 'sees the ground ahead',
 }

@@ -146,7 +146,7 @@ def claim(key: str, numbers: Any, holds: Any, /, **values: Any) -> Claim:
 def counted(claims: Sequence[Claim]) -> str:
     """Return as text how many statements have each verdict."""
     found = Counter(each.verdict for each in claims)
-    return '; '.join(f'{verdict}: {found[verdict]}' for verdict in VERDICTS if found[verdict])
+    return '; '.join(f'{verdict} {found[verdict]}' for verdict in VERDICTS if found[verdict])
 
 
 @dataclass(frozen=True)

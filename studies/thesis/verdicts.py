@@ -39,7 +39,7 @@ def _order(claim: Claim) -> tuple[list[int], int]:
 
 def tables(kept: Mapping[str, Any]) -> Iterator[tuple[Any, str]]:
     """Return each page of docs with what stands on it below :data:`MARK`, as Markdown."""
-    counts = f'Of all {kept["statements"]} statements {kept["counts"]}.\n\n'
+    counts = f'Verdicts on all {kept["statements"]} statements: {kept["counts"]}.\n\n'
     for page, chapters in PAGES.items():
         table = '| where | the thesis states | verdict | why |\n| --- | --- | --- | --- |\n'
         for claim in kept['claims']:
