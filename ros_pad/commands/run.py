@@ -275,9 +275,7 @@ def _show(trial: Trial, own: Metrics) -> None:
             after = 'not reached' if seconds is None else f'after {seconds:.1f} s'
             feet += f'; goal of {row["goal_m"]:g} m {after}'
         table.append([row['policy'], f'{1e3 * advance:.1f} mm', gain, f'{slip:.2f} m', feet])
-    print_table(
-        ['policy', 'a gait cycle', f'beside {trial.policy}', 'slip of a foot', ''], table
-    )
+    print_table(['policy', 'a gait cycle', f'beside {trial.policy}', 'slip of a foot', ''], table)
     matters = [each for each in settings['omitted'] if each['exceeds']]
     print(
         *(f'stayed flat: {refusal}' for refusal in own.refusals),

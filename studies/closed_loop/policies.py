@@ -85,7 +85,7 @@ HELD_OUT: dict[str, Changes] = {
     '13 N towed': {'tow': {'weight': 13.0}},
     'cycle of 0.8 s': {'gait': {'cycle': 0.8}},
     'cycle of 1.6 s': {'gait': {'cycle': 1.6}},
-    **_drawn(12),
+    **(DRAWN := _drawn(12)),
 }
 AGAINST: dict[str, Changes] = {
     'quadruped of 15 kg': {'scene': 'quadruped_patches'},
@@ -258,18 +258,18 @@ def _part(
         part['grounds'][name] = {**rows, 'ratios': _compared(rows)}
     rows = {policy: _row([results[job] for job in jobs], jobs) for policy, jobs in whole.items()}
     part['all'] = {**rows, 'ratios': _compared(rows)}
-    part['clusters'] = dict(zip(('low', 'high'), _clustered(part['grounds']), strict=True))
     return part
 
 
-def _clustered(grounds: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the 95 % interval of the adaptive policy's gain, drawing conditions, not floors."""
+def clustered(grounds: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
+    """Return the gain of the adaptive policy, and its 95 % interval over conditions."""
     pairs = []
-    for rows in grounds.values():
+    for rows in map(grounds.__getitem__, names):
         better = map(max, rows['flat']['each_mm'], rows['dome']['each_mm'])
         pairs.append((sum(rows['adaptive']['each_mm']), sum(better)))
+    ours, theirs = map(sum, zip(*pairs, strict=True))
     low, high = bootstrap(pairs, 10_000)
-    return round(low, 4), round(high, 4)
+    return {'of_means': round(ours / theirs, 4), 'low': round(low, 4), 'high': round(high, 4)}
 
 
 def frictions() -> dict[str, list[float]]:
@@ -318,6 +318,12 @@ def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
         'held out': _part(HELD_OUT, POLICIES, results),
         'against': _part(AGAINST, MAIN, results),
         'slower': [],
+    }
+    held = document['held out']['grounds']
+    document['clusters'] = {
+        f'all {len(HELD_OUT)} conditions': clustered(held, [*HELD_OUT]),
+        'one change': clustered(held, [name for name in HELD_OUT if name not in DRAWN]),
+        'five changes, drawn': clustered(held, [*DRAWN]),
     }
     for policy, slower in dict.fromkeys((job.policy, job.slower) for job in slow):
         jobs = [job for job in slow if (job.policy, job.slower) == (policy, slower)]
@@ -381,11 +387,11 @@ def overall(document: Mapping[str, Any]) -> str:
             f' {interval(better)} | {better["least"]:.3f} | {better["behind"]:.0%} |'
         )
     wrong = [gain for each in frictions().values() for gain in each]
-    clusters = document['held out']['clusters']
+    clusters = (f'{name} {interval(each)}' for name, each in document['clusters'].items())
     lines += [
         '',
-        'Gain of the adaptive policy over the better fixed shape of each floor, 95 % over clusters'
-        f' of conditions: {clusters["low"]:.3f} to {clusters["high"]:.3f}. On four tuning floors'
+        'Gain of the adaptive policy over the better fixed shape of each floor, with an interval'
+        f' over conditions: {"; ".join(clusters)}. On four tuning floors'
         f' of `{SCENE}`, with one of {len(frictions())} assumed numbers of friction halved or'
         f' doubled: {min(wrong):.2f} to {max(wrong):.2f}.',
     ]
@@ -410,11 +416,10 @@ def draw(document: Mapping[str, Any]) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=(7.6, 10.0), layout='constrained')
         panel = figure.subplots()
-        whole = document['held out']
-        names = ['how sure the gain is', f'chance: {len(whole["grounds"])} conditions']
-        heads = [0]
-        middle = whole['all']['ratios']['adaptive'][BETTER]['of_means']
-        _ratio(panel, 1, {**whole['clusters'], 'of_means': middle}, GREEN)
+        names, heads = ['how sure the gain is'], [0]
+        for name, row in document['clusters'].items():
+            _ratio(panel, len(names), row, GREEN)
+            names.append(f'chance: {name}')
         for name, (halved, doubled) in frictions().items():
             panel.plot([halved, doubled], [len(names)] * 2, color=BLACK, lw=0.8)
             panel.plot(halved, len(names), '<', color=BLACK, ms=5)
