@@ -66,13 +66,13 @@ def _ring() -> tuple[Claim, ...]:
     wrong = (2.0 * ring + height) / (2.0 * ring - height)
     domes = zip(np.asarray(pressed.sphere_radius).tolist(), b.tolist(), strict=True)
     exact = np.array([bath_meniscus(Wall.dome(*dome), WATER).height for dome in domes])
-    off, share = np.asarray(printed.height) / exact, b / ring
+    off, share = np.asarray(printed.height) / exact, b / np.asarray(printed.ring_radius)
     return (
         claim('a ring of liquid', 0.0, False),
         claim('ring and arc curve', wrong, np.all(np.abs(wrong - 1.0) <= MINIMAL), wrong=wrong,
               forces=FORCES),
-        claim('contact and ring have', share, np.all(share >= 1.0 - MINIMAL), share=share,
-              forces=FORCES),
+        claim('contact and ring have', share, np.all(share >= 1.0 - MINIMAL), printed=share,
+              share=b / ring, forces=FORCES),
         claim('height to which liquid', off, np.all(np.abs(off - 1.0) <= MINIMAL), off=off,
               forces=FORCES),
     )  # fmt: skip
@@ -120,9 +120,9 @@ def _pad() -> tuple[Claim, ...]:
     )
     tensions = 2.0 * math.sqrt(WATER.solid_tension * 0.04)
     return (
-        claim('strain stays where rubber', stretch, stretch <= 1.1, stretch=stretch),
-        claim('adhesion energy 2 of', tensions, abs(tensions / 0.006 - 1.0) <= 1.0,
-              tensions=tensions, wider=sticky / usual - 1.0),
+        claim('strain stays where rubber', stretch, None, stretch=stretch),
+        claim('adhesion energy 2 of', tensions, None, tensions=tensions,
+              wider=sticky / usual - 1.0),
     )  # fmt: skip
 
 
