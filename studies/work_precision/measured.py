@@ -214,7 +214,8 @@ def draw(figure: SubFigure) -> None:
         'Error against each measured point of the thesis. Green: laws that ros_pad solves; blue:'
         ' others.\nBars: 95 % interval of the constant that is fitted to the heights (cap: disc at'
         ' the 40 N/m of the thesis);\ntriangle: no state at one end. Force limits: where the gap'
-        ' is as high as the sheet is thick.\nThe values seem read off and rounded, lengths to 0.05 mm'
-        ' (grey), forces by an unknown amount.\nFigures 17 and 18 of the thesis have error bars, for which its text gives no numbers.',
+        ' is as high as the sheet is thick.\nThe values seem read off and rounded: lengths to'
+        ' 0.05 mm (grey), forces by an unknown amount.\nFigures 17 and 18 of the thesis have error'
+        ' bars, for which its text gives no numbers.',
         fontsize=9.0,
     )

@@ -47,7 +47,7 @@ def test_free_domes_have_the_errors_of_the_program():
     assert [row.measured for row in trial.pick('stiffness')] == [
         pytest.approx(k, abs=5e-3) for k in (44.03, 40.94, 39.06, 38.75)
     ]
-    assert [claim.holds for claim in trial.claims] == [True, True, None, False]
+    assert [claim.holds for claim in trial.claims] == [True, True, None, None]
 
 
 # Results of the thesis' program, m; its pi of 3.1415 changes the force by 3e-5.
@@ -115,9 +115,11 @@ def test_the_orderings_can_fail():
 def test_the_sign_of_what_liquid_adds_follows_from_assumed_numbers(changes, sign):
     scene = TRIALS['tangential'].scene
     trial = bench.run(dataclasses.replace(scene, foot=dataclasses.replace(scene.foot, **changes)))
-    (claim,) = (claim for claim in trial.claims if 'Title' in claim.thesis)
-    assert sign * min(claim.numbers[-2:], key=abs) > 0.0 and claim.verdict == 'underdetermined'
-    (shipped,) = (claim for claim in TRIALS['tangential'].claims if 'Title' in claim.thesis)
+    other, shipped = (
+        next(claim for claim in each.claims if 'capillary action' in claim.thesis)
+        for each in (trial, TRIALS['tangential'])
+    )
+    assert sign * min(other.numbers[-2:], key=abs) > 0.0 and other.verdict == 'underdetermined'
     # By hand: a load that comes in 1 s lays 11 nm at the edge, and twice as much at an eighth of
     # its area, so about 1 − exp(−0.03²) of the dry force is lost.
     assert min(shipped.numbers[:3]) > -0.0015 and max(shipped.numbers[:3]) < -0.0005
