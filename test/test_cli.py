@@ -41,7 +41,7 @@ def test_auto_runs_the_cheap_level_and_shows_why(tmp_path, capsys):
     assert cli.main([*words, '--out', str(out)]) == 0
     shown = capsys.readouterr().out
     assert 'hexapod_dry_slow, seed 0, simulated on level L1: ' in shown
-    assert 'accuracy: within ' in shown and 'in 95 of 100 scenes' in shown
+    assert 'numerical error: at most ' in shown and 'in 95 of 100 scenes' in shown
     assert 'left out' not in shown  # no shipped scene leaves out what matters to it
     page = (out / 'report.html').read_text()
     assert 'effect of soft pads on the motion of the body' in page and 'joints, servos' in page

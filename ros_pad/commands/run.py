@@ -52,12 +52,13 @@ def add(commands: Commands) -> None:
         'L0: leg on a rail, L1: in the plane, L2: with joints; auto: cheapest that will do'
     )
     sensing_text = (
-        'what slip is estimated from; joints, with IMU and forces as on robots, needs L2'
+        'what slip is estimated from: motion capture of the feet, or IMU, joints and forces (L2)'
     )
-    compare_text = 'do not walk the other policies on the same ground, as an adaptive run does'
-    live_text = 'share the topics, by default in the whole subnet: real regulators get set-points'
+    compare_text = 'walk this policy alone, and not the others on the same ground as well'
+    live_text = 'share the topics with the whole subnet, where real regulators get set-points'
+    policy_text = "always flat or dome, by estimates, or by the true ground (default: the scene's)"
     of_a_walk = [
-        add('--policy', choices=POLICIES, help="chooses morphologies (default: the scene's)"),
+        add('--policy', choices=POLICIES, help=policy_text),
         add('--cycles', type=int, help="gait cycles (default: the scene's)"),
         add('--seed', type=int, default=0, help='seed of floor and noise (default 0)'),
         add('--fidelity', choices=levels.FIDELITIES, default='auto', help=levels_text),
@@ -256,11 +257,11 @@ def _show(trial: Trial, own: Metrics) -> None:
     settings = trial.settings
     accuracy, bound = bag_notes.promise(trial), settings['fidelity_bound']
     if bound is not None and not own.verdict:
-        most = f'within {math.ceil(1e3 * bound) / 10.0:.1f} % of the finest simulation'
+        most = f'at most {math.ceil(1e3 * bound) / 10.0:.1f} % beside the finest simulation'
         accuracy = f'{most}, in 95 of 100 scenes like this one'
     print(
         f'\n{trial.scene}, seed {trial.seed}, simulated on level {trial.fidelity}:'
-        f' {own.distance_m:.2f} m in {own.cycles:.3g} gait cycles\naccuracy: {accuracy}\n'
+        f' {own.distance_m:.2f} m in {own.cycles:.3g} gait cycles\nnumerical error: {accuracy}\n'
     )
     table: list[list[str]] = []
     for row in ({'policy': trial.policy, **own.as_dict()}, *settings['comparison']):

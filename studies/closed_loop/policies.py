@@ -13,7 +13,6 @@ docs/model/policies.md.
 from __future__ import annotations
 
 import itertools
-import json
 import statistics
 import time
 from collections.abc import Mapping, Sequence
@@ -35,7 +34,7 @@ from ros_pad.simulation.terrain import patch_lengths
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop import loops, rivals
-from studies.drawing import BLACK, BLUE, GREEN, STYLE
+from studies.drawing import BLUE, GREEN, STYLE
 from studies.samples import bootstrap
 
 BETTER = 'better fixed shape'
@@ -105,7 +104,18 @@ AGAINST: dict[str, Changes] = {
 """Grounds: changes to floor, towed load, gait and foot of the scene, or another scene. ``file``:
 estimators and controller know another foot, that of the scene with these changes."""
 
-GROUNDS = {**TUNING, **HELD_OUT, **AGAINST}
+FRICTION: dict[str, Changes] = {'as shipped': {}} | {
+    f'{key.replace("_", " ")} {word}': {
+        'foot': {key: factor * getattr(Scene.load(SCENE).foot, key)},
+        'file': {},
+    }
+    for key in ('friction', 'shear_strength', 'conforming_pressure', 'boundary_friction',
+                'critical_film', 'film_exponent')
+    for word, factor in (('halved', 0.5), ('doubled', 2.0))
+}  # fmt: skip
+"""Numbers that decide the friction of feet, all of them assumed; the foot's file is as shipped."""
+
+GROUNDS = {**TUNING, **HELD_OUT, **AGAINST, **FRICTION}
 TUNED_ON = ('no adhesion, not known',)
 """Of the grounds that are not for tuning, those on which a setting was chosen nevertheless."""
 
@@ -125,11 +135,10 @@ RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
 """Rivals with the settings that were best on the tuning grounds."""
 
 POLICIES = ('flat', 'dome', 'adaptive', *RIVALS, 'oracle')
-FRICTION = 'friction', 'shear_strength', 'conforming_pressure', 'critical_film', 'film_exponent'
-"""How numbers of a foot file that decide its friction end, all of them assumed."""
 PAGE = command.ROOT / 'docs' / 'model' / 'policies.md'
 MARKS = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
 MAIN = ('flat', 'dome', 'adaptive', 'each 8 steps', 'oracle')
+THREE = MAIN[:3]
 
 
 @dataclass(frozen=True)
@@ -220,7 +229,7 @@ def _compared(rows: Mapping[str, Any]) -> dict[str, Any]:
     better = [max(pair) for pair in zip(each['flat'], each['dome'], strict=True)]
     return {
         name: {
-            'oracle': ratio(own, each['oracle']),
+            **({'oracle': ratio(own, each['oracle'])} if 'oracle' in each else {}),
             BETTER: ratio(own, better),
             'adaptive to it': ratio(each['adaptive'], own),
         }
@@ -272,23 +281,6 @@ def clustered(grounds: Mapping[str, Any], names: Sequence[str]) -> dict[str, flo
     return {'of_means': round(ours / theirs, 4), 'low': round(low, 4), 'high': round(high, 4)}
 
 
-def frictions() -> dict[str, list[float]]:
-    """Return the gain of the adaptive policy with an assumed number of friction wrong.
-
-    By number: halved and doubled in the world, while estimator and controller keep the shipped
-    one; over the better fixed shape, as ``python -m studies assumptions`` has walked them.
-    """
-    assumed = json.loads((command.CHARTS / 'assumptions.json').read_text())
-    return {
-        row['label']: [
-            row[word]['adaptive_mm'] / max(row[word]['flat_mm'], row[word]['dome_mm'])
-            for word in ('halved', 'doubled')
-        ]
-        for row in assumed['assumptions']
-        if row['where'].startswith('feet/') and row['where'].endswith(FRICTION)
-    }
-
-
 def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
     """Walk everything and return the document that is saved."""
     started = time.perf_counter()
@@ -308,6 +300,13 @@ def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
         many = 2 * floors if name == 'patches of 0.3 m' else many
         for policy in POLICIES if name in HELD_OUT else MAIN:
             jobs += [Job(name, policy, 1.0, first + k, cycles) for k in range(many)]
+    # All of these have the same floors.
+    seeds = range(FIRST_SEED, FIRST_SEED + floors)
+    jobs += [
+        Job(*each, 1.0, seed, cycles)
+        for each in itertools.product(FRICTION, THREE)
+        for seed in seeds
+    ]
     found = command.in_processes(walk, [(job,) for job in jobs], processes, 'policies')
     results = dict(zip(jobs, found, strict=True))
     document: dict[str, Any] = {
@@ -317,6 +316,7 @@ def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
         'changes': {**HELD_OUT, **AGAINST},
         'held out': _part(HELD_OUT, POLICIES, results),
         'against': _part(AGAINST, MAIN, results),
+        'friction': _part(FRICTION, THREE, results),
         'slower': [],
     }
     held = document['held out']['grounds']
@@ -386,14 +386,17 @@ def overall(document: Mapping[str, Any]) -> str:
             f' {interval(ratios["oracle"]) if name != "oracle" else ""} |'
             f' {interval(better)} | {better["least"]:.3f} | {better["behind"]:.0%} |'
         )
-    wrong = [gain for each in frictions().values() for gain in each]
     clusters = (f'{name} {interval(each)}' for name, each in document['clusters'].items())
+    wrong = {
+        name: row['ratios']['adaptive'][BETTER]['of_means']
+        for name, row in document['friction']['grounds'].items()
+    }
     lines += [
         '',
         'Gain of the adaptive policy over the better fixed shape of each floor, with an interval'
-        f' over conditions: {"; ".join(clusters)}. On four tuning floors'
-        f' of `{SCENE}`, with one of {len(frictions())} assumed numbers of friction halved or'
-        f' doubled: {min(wrong):.2f} to {max(wrong):.2f}.',
+        f' over conditions: {"; ".join(clusters)}. On four floors of `{SCENE}` as shipped'
+        f' {wrong.pop("as shipped"):.3f}; with one assumed number of friction halved or doubled'
+        f' {min(wrong.values()):.3f} to {max(wrong.values()):.3f}.',
     ]
     return '\n'.join(lines)
 
@@ -402,6 +405,7 @@ def overall(document: Mapping[str, Any]) -> str:
 
 _LOOKS = ((BETTER, GREEN, -0.15), ('oracle', BLUE, 0.15))
 _PARTS = {
+    'friction': 'assumed friction wrong, not known, on the same floors',
     'held out': 'held out: 12 conditions with one change, 12 with five',
     'against': 'another robot, little to win, or foot file wrong',
 }
@@ -410,28 +414,24 @@ _PARTS = {
 def draw(document: Mapping[str, Any]) -> Figure:
     """Draw the adaptive policy against the better fixed shape and the oracle, ground by ground.
 
-    First, for all held-out grounds together, the interval of chance beside what wrong assumptions
+    First, for all held-out grounds together, the interval of chance, then what wrong assumptions
     on friction do.
     """
     with rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 10.0), layout='constrained')
+        figure = Figure(figsize=(7.6, 11.0), layout='constrained')
         panel = figure.subplots()
         names, heads = ['how sure the gain is'], [0]
         for name, row in document['clusters'].items():
             _ratio(panel, len(names), row, GREEN)
             names.append(f'chance: {name}')
-        for name, (halved, doubled) in frictions().items():
-            panel.plot([halved, doubled], [len(names)] * 2, color=BLACK, lw=0.8)
-            panel.plot(halved, len(names), '<', color=BLACK, ms=5)
-            panel.plot(doubled, len(names), '>', color=BLACK, ms=5)
-            names.append(f'assumption: {name}')
         for part, heading in _PARTS.items():
             heads.append(len(names))
             names.append(heading)
             for name, row in document[part]['grounds'].items():
                 for other, colour, shift in _LOOKS:
-                    ratio = row['ratios']['adaptive'][other]
-                    _ratio(panel, len(names) + shift, ratio, colour)
+                    if other in row['ratios']['adaptive']:
+                        ratio = row['ratios']['adaptive'][other]
+                        _ratio(panel, len(names) + shift, ratio, colour)
                 tuned = ', tuned on' if name in TUNED_ON else ''
                 names.append(f'{name} ({len(row["flat"]["seeds"])}{tuned})')
         panel.axvline(1.0, color='0.6', linewidth=0.8, zorder=0)
@@ -446,10 +446,6 @@ def draw(document: Mapping[str, Any]) -> Figure:
         handles = [
             Line2D([], [], color=colour, marker='o', ms=4, label=f'to the {name}')
             for name, colour, _ in _LOOKS
-        ]
-        handles += [
-            Line2D([], [], color=BLACK, marker=marker, ls='', ms=5, label=f'friction {word}')
-            for marker, word in (('<', 'halved'), ('>', 'doubled'))
         ]
         figure.legend(handles=handles, loc='outside lower right', ncols=3)
     return figure
