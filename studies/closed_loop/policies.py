@@ -406,7 +406,7 @@ def overall(document: Mapping[str, Any]) -> str:
 _LOOKS = ((BETTER, GREEN, -0.15), ('oracle', BLUE, 0.15))
 _PARTS = {
     'friction': 'assumed friction wrong, not known, on the same floors',
-    'held out': 'held out: 12 conditions with one change, 12 with five',
+    'held out': 'held out: one change, or patches, wet share, film, tow, cycle',
     'against': 'another robot, little to win, or foot file wrong',
 }
 
@@ -418,7 +418,7 @@ def draw(document: Mapping[str, Any]) -> Figure:
     on friction do.
     """
     with rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 11.0), layout='constrained')
+        figure = Figure(figsize=(8.4, 11.0), layout='constrained')
         panel = figure.subplots()
         names, heads = ['how sure the gain is'], [0]
         for name, row in document['clusters'].items():
@@ -439,8 +439,10 @@ def draw(document: Mapping[str, Any]) -> Figure:
         for head in heads:
             panel.get_yticklabels()[head].set_fontweight('bold')
         panel.tick_params(axis='y', length=0)
+        panel.minorticks_off()
         panel.set(
             ylim=(len(names) - 0.5, -0.5), xlabel='ratio of mean distances, 95 % interval',
+            xscale='log', xticks=(ticks := (0.9, 1.0, 1.1, 1.2, 1.5, 2.0, 2.5)), xticklabels=ticks,
             title='distance of feet that adapt (floors)',
         )  # fmt: skip
         handles = [
