@@ -94,7 +94,10 @@ AGAINST: dict[str, Changes] = {
     'nothing towed': {'tow': {'weight': 0.0}},
     # Without adhesion, flat feet have the same friction on dry ground as domes.
     'no adhesion': {'foot': {'friction': 0.41, 'shear_strength': 0.0}},
-    'no adhesion, not known': {'foot': {'friction': 0.41, 'shear_strength': 0.0}, 'file': {}},
+    'no adhesion, not known, tuned': {
+        'foot': {'friction': 0.41, 'shear_strength': 0.0},
+        'file': {},
+    },
     'a third of the adhesion, not known': {'foot': {'shear_strength': 1600.0}, 'file': {}},
     'adhesion 1.4 times less than known': {'file': {'shear_strength': 1.4 * 4700.0}},
     'wet friction half of what is known': {'foot': {'boundary_friction': 0.06}, 'file': {}},
@@ -116,9 +119,6 @@ FRICTION: dict[str, Changes] = {'as shipped': {}} | {
 """Numbers that decide the friction of feet, all of them assumed; the foot's file is as shipped."""
 
 GROUNDS = {**TUNING, **HELD_OUT, **AGAINST, **FRICTION}
-TUNED_ON = ('no adhesion, not known',)
-"""Of the grounds that are not for tuning, those on which a setting was chosen nevertheless."""
-
 SETTINGS: dict[str, list[tuple[Any, ...]]] = {
     'count': [(2,), (4,), (8,), (16,)],
     'adaptive': [(0.6,), (0.7,), (0.75,), (0.8,), (0.85,), (0.9,)],
@@ -302,11 +302,7 @@ def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
             jobs += [Job(name, policy, 1.0, first + k, cycles) for k in range(many)]
     # All of these have the same floors.
     seeds = range(FIRST_SEED, FIRST_SEED + floors)
-    jobs += [
-        Job(*each, 1.0, seed, cycles)
-        for each in itertools.product(FRICTION, THREE)
-        for seed in seeds
-    ]
+    jobs += [Job(g, p, 1.0, k, cycles) for g, p, k in itertools.product(FRICTION, THREE, seeds)]
     found = command.in_processes(walk, [(job,) for job in jobs], processes, 'policies')
     results = dict(zip(jobs, found, strict=True))
     document: dict[str, Any] = {
@@ -432,8 +428,7 @@ def draw(document: Mapping[str, Any]) -> Figure:
                     if other in row['ratios']['adaptive']:
                         ratio = row['ratios']['adaptive'][other]
                         _ratio(panel, len(names) + shift, ratio, colour)
-                tuned = ', tuned on' if name in TUNED_ON else ''
-                names.append(f'{name} ({len(row["flat"]["seeds"])}{tuned})')
+                names.append(f'{name} ({len(row["flat"]["seeds"])})')
         panel.axvline(1.0, color='0.6', linewidth=0.8, zorder=0)
         panel.set_yticks(range(len(names)), names)
         for head in heads:
