@@ -43,6 +43,11 @@ def test_auto_runs_the_cheap_level_and_shows_why(tmp_path, capsys):
     assert 'hexapod_dry_slow, seed 0, simulated on level L1: ' in shown
     assert 'numerical error: at most ' in shown and 'in 95 of 100 scenes' in shown
     assert 'left out' not in shown  # no shipped scene leaves out what matters to it
+    text = SCENE.with_name('hexapod_dry_slow.yaml').read_text()
+    (tmp_path / 'strict.yaml').write_text(re.sub('accuracy:.*', 'accuracy: 0.001', text))
+    words[1:2] = [str(tmp_path / 'strict.yaml'), '--fidelity', 'L1', '--out', str(tmp_path / 'b')]
+    assert cli.main(words) == 0
+    assert re.search(r'it matters: joints, servos.*, about [0-9.]+ % of', capsys.readouterr().out)
     page = (out / 'report.html').read_text()
     assert 'effect of soft pads on the motion of the body' in page and 'joints, servos' in page
 

@@ -278,10 +278,11 @@ def _show(trial: Trial, own: Metrics) -> None:
         table.append([row['policy'], f'{1e3 * advance:.1f} mm', gain, f'{slip:.2f} m', feet])
     print_table(['policy', 'a gait cycle', f'beside {trial.policy}', 'slip of a foot', ''], table)
     matters = [each for each in settings['omitted'] if each['exceeds']]
+    text = 'left out, and it matters: {term}, about {effect:.1%} of the result'
     print(
         *(f'stayed flat: {refusal}' for refusal in own.refusals),
         *(f'fault: {fault}' for fault in fault_lines(own.faults)),
-        *(f'left out, and it matters: {each["term"]}: {each["reason"]}' for each in matters),
+        *(text.format(**each).replace('%', ' %') for each in matters),
         sep='\n',
     )
 
